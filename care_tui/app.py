@@ -36,6 +36,7 @@ from care_tui.screens.help import HelpScreen, Keys
 from care_tui.settings import SERVER, Settings
 from care_tui.themes import DEFAULT, HIGH_CONTRAST, OWN_COLOURS
 from care_tui.threads import DaemonThreads
+from care_tui.tracebacks import shorten
 from care_tui.workspace import Workspace
 
 _LEAVE_S, _MOST_S = 0.05, 3.0
@@ -254,6 +255,7 @@ def is_folder_of_logs(path: Path) -> bool:
 
 def run(request: Request | None, settings: Settings) -> int:
     """Open the app; answers the exit code."""
+    shorten()
     app = CareApp(request, settings=settings)
     answer = app.run(mouse=settings.mouse)
     return int(ExitCode.USAGE if answer is None else answer)

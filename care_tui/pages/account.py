@@ -49,7 +49,8 @@ class AccountPage(DiagnosisPage):
         diagnosis, glyphs, lines = self.session.diagnosis, self.glyphs, self._lines
         listing = Listing(len(lines), lambda i, _width: (health_row_item(lines[i], glyphs),), lambda i: lines[i].words)
         robot = diagnosis.health.robot
-        return View(Content("What happened" + (f": {clean(robot)}" if robot else "")), self._detail, listing)
+        title = Content("What happened" + (f": {clean(robot)}" if robot else ""))
+        return View(title, self._detail, listing, about="What shows it")
 
     def _detail(self, index: int | None) -> Rows:
         diagnosis, case = self.session.diagnosis, self.session.case

@@ -80,9 +80,7 @@ class CausesPage(DiagnosisPage):
     def view_of_diagnosis(self) -> View:
         ranked = self.ranked()
         listing = Listing(len(ranked), lambda i, width: self._item(ranked[i], width), lambda i: f"{ranked[i].name}")
-        here = self.choices.index
-        about = ranked[here].name if here is not None and here < len(ranked) else ""
-        return View(self._title(), self._detail, listing, about=about)
+        return View(self._title(), self._detail, listing, about="What shows it, and how it led to the fault")
 
     def ranked(self) -> list[Explanation]:
         """Parts, parameters, what was met and chance in one ranking, then the causes that it does not name, and those
@@ -276,6 +274,7 @@ class CausesPage(DiagnosisPage):
         """Turn to the causes of the next faulty objective."""
         if self.session.next_fault():
             self.show(0)
+            self.refresh_bindings()
 
     def action_dismiss(self) -> None:
         """Set the cause under the cursor aside, or take it back."""

@@ -57,8 +57,8 @@ class ObjectivesPage(DiagnosisPage):
             lambda i, _width: (objective_item(results[i], width, glyphs, is_mine=results[i].name in mine),),
             lambda i: results[i].variable.name,
         )
-        about = results[self.session.objective].name if self.session.objective < len(results) else ""
-        return View(Content(f"Objectives: {counted(results)}"), self._detail, listing, self.session.objective, about)
+        title = Content(f"Objectives: {counted(results)}")
+        return View(title, self._detail, listing, self.session.objective, "How it was judged")
 
     @property
     def _mine(self) -> dict[str, float]:

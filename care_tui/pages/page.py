@@ -131,7 +131,6 @@ class Page(Container):
             focused = self.screen.focused
             if focused is None or not focused.display or (focused is self.reader and choices.display):
                 self.take_focus()
-            self.refresh_bindings()
 
     def show_text(self, *, from_top: bool = True) -> None:
         """Show the text about the item under the cursor."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
@@ -10,9 +11,10 @@ from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
-from textual.content import Content
+from textual.reactive import Reactive
 from textual.screen import Screen
-from textual.widgets import ContentSwitcher, Footer, Static, Tabs
+from textual.widget import Widget
+from textual.widgets import ContentSwitcher, Static, Tabs
 from textual.worker import get_current_worker
 
 from care_core.application.case import Case, Request
@@ -33,6 +35,7 @@ from care_tui.places import remember
 from care_tui.session import Session
 from care_tui.widgets.answer_bar import AnswerBar
 from care_tui.widgets.filter_bar import FilterBar
+from care_tui.widgets.keys import Keys
 from care_tui.widgets.tab_row import TabRow
 from care_tui.workspace import Workspace
 
@@ -58,6 +61,8 @@ class CaseScreen(Screen[None]):
     """Turns from page to page, and reads, judges and asks what they want read, judged and asked."""
 
     AUTO_FOCUS = ""
+    focused: Reactive[Widget | None] = Reactive(None, repaint=False)
+    """Without a repaint of the whole screen: the frames of the panes tell which is focused."""
     # Textual declares both as instance variables, so they cannot be ClassVar here.
     HORIZONTAL_BREAKPOINTS = [(0, "-too-narrow"), (MIN_WIDTH, "-narrow"), (WIDE, "-wide"), (WIDEST, "-widest")]  # noqa: RUF012
     VERTICAL_BREAKPOINTS = [(0, "-too-low"), (MIN_HEIGHT, "-low"), (ROOMY, "-tall")]  # noqa: RUF012
@@ -91,7 +96,7 @@ class CaseScreen(Screen[None]):
         yield AnswerBar(self.workspace.glyphs)
         yield ContentSwitcher(id="pages")
         yield FilterBar()
-        yield Footer(show_command_palette=False, compact=True)
+        yield Keys()
 
     async def on_mount(self) -> None:
         request = self.workspace.request
@@ -131,12 +136,14 @@ class CaseScreen(Screen[None]):
         page = cast("Page", switcher.get_child_by_id(id))
         if is_new or moment_s is not None or subject is not None:
             page.look_at(moment_s, subject)
-        with self.app.batch_update():
-            switcher.current = id
-            page.enter()
-            page.show(index)
-            page.take_focus()
-            self._mark()
+        batch = ExitStack()
+        batch.enter_context(self.app.batch_update())
+        switcher.current = id
+        page.enter()
+        page.show(index)
+        page.take_focus()
+        self._mark()
+        self.call_later(batch.close)  # when the panes know of their focus: one frame, not one for each
 
     def _mark(self) -> None:
         session = self.session
@@ -144,7 +151,9 @@ class CaseScreen(Screen[None]):
         self.query_one("#step-tabs", TabRow).mark(self.here, empty)
         self.query_one("#view-tabs", TabRow).mark(self.here, [page.name for page in VIEWS if self._lacks(page.name)])
         name = "" if session.path is None else clean(session.path.name)
-        self.query_one("#log-name", Static).update(Content(name))
+        shown = self.query_one("#log-name", Static)
+        if shown.content != name:
+            shown.update(name)
         self.query_one(AnswerBar).tell(session)
 
     def _lacks(self, name: str) -> str:
@@ -305,6 +314,7 @@ class CaseScreen(Screen[None]):
             self.session.error = answer
             self._mark()
             self.page.show()
+            self.refresh_bindings()
             return
         self.session.take(answer)
         diagnosis = answer.diagnosis
@@ -319,6 +329,7 @@ class CaseScreen(Screen[None]):
             self.page.enter()
             self._mark()
             self.page.show()
+            self.refresh_bindings()
 
     def _stop_reading(self) -> None:
         self.workers.cancel_group(self, DIAGNOSIS)
@@ -326,6 +337,7 @@ class CaseScreen(Screen[None]):
         cast("CareApp", self.app).note(self.session.error)
         self._mark()
         self.page.show()
+        self.refresh_bindings()
 
     # What was decided
 
@@ -339,7 +351,9 @@ class CaseScreen(Screen[None]):
             changes, case = dict(session.basket.ticked), session.case
             self.workers.cancel_group(self, PREDICTION)
             self.run_worker(lambda: self._predict(lambda: engine.predict(case, changes)), group=PREDICTION, thread=True)
-        self._show_answer()
+        with self.app.batch_update():
+            self.query_one(AnswerBar).tell(session)
+            self.page.show()
 
     def _predict(self, predict: Callable[[], Fix]) -> None:
         worker = get_current_worker()
@@ -355,13 +369,10 @@ class CaseScreen(Screen[None]):
             self.session.fix_error = answer
         else:
             self.session.fix = answer
-        self.page.enter()
-        self._show_answer()
-
-    def _show_answer(self) -> None:
         with self.app.batch_update():
             self.query_one(AnswerBar).tell(self.session)
-            self.page.show()
+            self.page.enter()
+            self.page.show_text()
 
 
 def _has_failed_part(health: Health) -> bool:

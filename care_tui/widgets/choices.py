@@ -38,22 +38,14 @@ class Listing(Record):
 NOTHING = Listing(0, lambda _index, _width: (), lambda _index: "")
 
 
-class _Item(Visual):
-    """One item of the list's listing, whatever that is now."""
+class _Lines(Visual):
+    """So many lines, for Textual to count: `Choices` draws them itself."""
 
-    def __init__(self, choices: Choices, index: int) -> None:
-        self._choices, self._index = choices, index
+    def __init__(self, height: int) -> None:
+        self._height = height
 
     def render_strips(self, width: int, height: int | None, style: Style, options: RenderOptions) -> list[Strip]:
-        lines = [
-            line.pad(1, 1).pad_right(width - 2 - line.cell_length)
-            for line in self._choices.lines(self._index, width - 2)
-        ]
-        if style.underline:  # stands for reverse in the style sheet: `get_visual_style` leaves reverse out
-            style += Style(underline=False, reverse=True)
-            # Grey on the bar of the cursor is a patch.
-            lines = [Content(line.plain, [span for span in line.spans if span.style != "dim"]) for line in lines]
-        return [strip for line in lines for strip in line.render_strips(width, 1, style, options)]
+        return [Strip.blank(width, style.rich_style)] * self._height
 
     def get_optimal_width(self, rules: RulesMap, container_width: int) -> int:
         return container_width
@@ -62,12 +54,12 @@ class _Item(Visual):
         return 1
 
     def get_height(self, rules: RulesMap, width: int) -> int:
-        return self._choices.listing.height
+        return self._height
 
 
 class Choices(OptionList, inherit_bindings=False):
-    """Textual's option list for long lists: it stops at its ends, never wraps an item, and a step of the cursor paints
-    two items. Enter is left to the page."""
+    """Textual's option list for long lists: it stops at its ends, never wraps an item, and paints only the lines that
+    changed. Enter is left to the page."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("down,j", "cursor_down", "Next", show=False, id="list.down"),
@@ -84,7 +76,9 @@ class Choices(OptionList, inherit_bindings=False):
         self._more = more
         self.listing = NOTHING
         self._shown: list[int] = []
+        self._height = 0
         self._filter = ""
+        self._painted: dict[int, Content] = {}
 
     @property
     def index(self) -> int | None:
@@ -97,17 +91,10 @@ class Choices(OptionList, inherit_bindings=False):
         width = max(self.scrollable_content_region.width - 2, 60)
         return "\n".join(line.plain for index in self._shown for line in self.listing.item(index, width))
 
-    def lines(self, index: int, width: int) -> list[Content]:
-        """The lines of an item, none longer than the width."""
-        return [
-            line if line.cell_length <= width else line.truncate(width - 1) + self._more
-            for line in self.listing.item(index, width)
-        ]
-
     def show(self, listing: Listing, index: int | None = None) -> None:
         """Replace the items and put the cursor on `index`, else on the first; no message is sent."""
-        before, self.listing = self.listing, listing
-        self._fill(index, is_same=(before.count, before.height) == (listing.count, listing.height))
+        self.listing = listing
+        self._fill(index)
 
     def filter(self, words: str) -> None:
         """Show only the items that hold these words; all of them when empty. No message is sent."""
@@ -115,17 +102,52 @@ class Choices(OptionList, inherit_bindings=False):
             here, self._filter = self.index, words.casefold()
             self._fill(here)
 
-    def _fill(self, index: int | None, *, is_same: bool = False) -> None:
-        count, words = self.listing.count, self.listing.words
+    def _fill(self, index: int | None) -> None:
+        count, words, height = self.listing.count, self.listing.words, self.listing.height
         shown = [i for i in range(count) if not self._filter or self._filter in words(i).casefold()]
         with self.prevent(OptionList.OptionHighlighted):
-            if is_same and shown == self._shown and shown:
-                self.replace_option_prompt_at_index(0, _Item(self, shown[0]))  # has all of them drawn anew
-            else:
-                self._shown = shown
-                self.set_options(Option(_Item(self, i)) for i in shown)
+            if (len(shown), height) != (self.option_count, self._height):
+                self._height = height
+                self.set_options(Option(_Lines(height)) for _ in shown)
+            self._shown = shown
             self.highlighted = None if not shown else shown.index(index) if index in shown else 0
         self.scroll_to_highlight()
+        self._paint()
+
+    def _paint(self) -> None:
+        """Have the lines in view painted that are not what was painted last."""
+        before, self._painted = self._painted, {}
+        for row in range(self.size.height):
+            y = self.scroll_offset.y + row
+            line = self._line(y)
+            if y not in before or not before[y].is_same(line):
+                self.refresh_lines(y)
+
+    def _line(self, y: int) -> Content:
+        """Line y of the list, cut off at the width; empty below its end."""
+        place, part = divmod(y, self.listing.height)
+        width = self.scrollable_content_region.width - 2
+        if place >= len(self._shown) or width < 1:
+            return Content()
+        line = self.listing.item(self._shown[place], width)[part]
+        if line.cell_length > width:
+            line = line.truncate(width - 1) + self._more
+        if place == self.highlighted and self.has_focus:  # grey on the bar of the cursor is a patch
+            line = Content(line.plain, [span for span in line.spans if span.style != "dim"])
+        return line.pad(1, 1).pad_right(width - line.cell_length)
+
+    def render_line(self, y: int) -> Strip:
+        y += self.scroll_offset.y
+        line, style = self._line(y), self.visual_style
+        self._painted[y] = line
+        place = y // self.listing.height
+        if place == self.highlighted:
+            # Reversed: status colours stay legible, and a terminal without colours shows it too.
+            style += Style(bold=True, reverse=self.has_focus)
+        if not line.plain:
+            return Strip.blank(self.size.width, self.visual_style.rich_style)
+        strip = Visual.to_strips(self, line, line.cell_length, 1, style)[0]
+        return strip.simplify().apply_meta({"option": place})
 
     def watch_highlighted(self, before: int | None, highlighted: int | None) -> None:  # type: ignore[override]
         super().watch_highlighted(highlighted)

@@ -16,6 +16,9 @@ from textual.visual import Visual
 from care_tui.render.rows import Row, Rows
 from care_tui.widgets.choices import SCROLL_KEYS
 
+_STEP = 5
+"""Lines by which a text that does not fit grows."""
+
 
 class Reader(ScrollView, can_focus=True, inherit_bindings=False):
     """A scrollable text. Another one repaints only the lines that differ: a slow link pays for no more."""
@@ -45,6 +48,7 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
         self._rows = rows or Rows([])
         self._filter = ""
         self._lines: list[Content] = []
+        self._width = 0
 
     @property
     def plain(self) -> str:
@@ -61,7 +65,14 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
         self._rows = rows
         if from_top and self.scroll_offset.y:
             self.scroll_to(y=0, animate=False, immediate=True)
-        self._lay_out()
+        before = self._lines
+        self._wrap()
+        top = self.scroll_offset.y
+        for row in range(self.size.height):
+            old, new = _line(before, top + row), _line(self._lines, top + row)
+            if not old.is_same(new):
+                self.refresh(Region(0, row, max(old.cell_length, new.cell_length), 1))
+        self._fit()
 
     def filter(self, words: str) -> None:
         """Show only the rows that hold these words; all of them when empty."""
@@ -74,25 +85,27 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
             return self._rows
         return Rows(row for row in self._rows.rows if self._filter in row.content.plain.casefold())
 
-    def _lay_out(self) -> None:
-        width, height = self.room
-        before, self._lines = self._lines, self._kept().wrap(width)
-        size = Size(width, len(self._lines) if len(self._lines) > height else 1)
-        if size != self.virtual_size:  # a new size has the pane painted, so texts that fit have the same
+    def _wrap(self) -> None:
+        self._width = self.room.width
+        self._lines = self._kept().wrap(self._width)
+
+    def _fit(self) -> None:
+        """Have as much to scroll as there is. A new size has the pane painted, so it changes seldom."""
+        count, room = len(self._lines), self.room
+        size = Size(room.width, -(-count // _STEP) * _STEP if count > room.height else 1)
+        if size != self.virtual_size:
             self.virtual_size = size
-        top = self.scroll_offset.y
-        for row in range(self.size.height):
-            old, new = _line(before, top + row), _line(self._lines, top + row)
-            if not old.is_same(new):
-                self.refresh(Region(0, row, max(old.cell_length, new.cell_length), 1))
 
     def on_resize(self, event: Resize) -> None:
-        self._lines = []
-        self._lay_out()
-        self.refresh()
+        if self._width != self.room.width:
+            self._wrap()
+            self.refresh()
+        self._fit()
         self.post_message(self.Fitted(self))
 
     def render_line(self, y: int) -> Strip:
+        if self._width != self.room.width:  # drawn before it is told of its new size: right at once, not twice
+            self._wrap()
         width, style = self.size.width, self.visual_style
         line = _line(self._lines, self.scroll_offset.y + y)
         if not line.plain:
