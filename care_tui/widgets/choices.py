@@ -8,6 +8,7 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.css.styles import RulesMap
+from textual.events import Resize
 from textual.reactive import reactive
 from textual.strip import Strip
 from textual.style import Style
@@ -148,6 +149,11 @@ class Choices(OptionList, inherit_bindings=False):
             return Strip.blank(self.size.width, self.visual_style.rich_style)
         strip = Visual.to_strips(self, line, line.cell_length, 1, style)[0]
         return strip.simplify().apply_meta({"option": place})
+
+    def on_resize(self, event: Resize) -> None:
+        event.prevent_default()  # Textual would paint all of it
+        self.scroll_to_highlight()
+        self._paint()
 
     def watch_highlighted(self, before: int | None, highlighted: int | None) -> None:  # type: ignore[override]
         super().watch_highlighted(highlighted)

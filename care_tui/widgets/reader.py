@@ -72,7 +72,7 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
             old, new = _line(before, top + row), _line(self._lines, top + row)
             if not old.is_same(new):
                 self.refresh(Region(0, row, max(old.cell_length, new.cell_length), 1))
-        self._fit()
+        self.call_after_refresh(self._fit)  # with the size that it will have then
 
     def filter(self, words: str) -> None:
         """Show only the rows that hold these words; all of them when empty."""
