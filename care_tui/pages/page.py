@@ -139,7 +139,8 @@ class Page(Container):
         self._show_text(self._view, from_top=from_top)
 
     def _show_text(self, view: View, *, from_top: bool = True) -> None:
-        self.reader.show(view.detail(self.index), from_top=from_top)
+        if self.reader.size or not self.FITS:  # else it is drawn when its size is known
+            self.reader.show(view.detail(self.index), from_top=from_top)
 
     def _show_titles(self) -> None:
         """Titles are in the frames of the panes; that of the page on the first of them."""

@@ -65,6 +65,9 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
         self._rows = rows
         if from_top and self.scroll_offset.y:
             self.scroll_to(y=0, animate=False, immediate=True)
+        if not self.size:  # it is hidden: wrapped when it is drawn
+            self._width = 0
+            return
         before = self._lines
         self._wrap()
         top = self.scroll_offset.y
@@ -91,12 +94,16 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
 
     def _fit(self) -> None:
         """Have as much to scroll as there is. A new size has the pane painted, so it changes seldom."""
+        if not self.size:  # it is hidden
+            return
         count, room = len(self._lines), self.room
-        size = Size(room.width, -(-count // _STEP) * _STEP if count > room.height else 1)
+        size = Size(room.width, -(-count // _STEP) * _STEP) if count > room.height else Size(0, 0)
         if size != self.virtual_size:
             self.virtual_size = size
 
     def on_resize(self, event: Resize) -> None:
+        if not self.size:
+            return
         if self._width != self.room.width:
             self._wrap()
             self.refresh()
