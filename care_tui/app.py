@@ -95,7 +95,7 @@ class CareApp(App[int], inherit_bindings=False):
         self._case = CaseScreen(self.workspace)
         self._held = ExitStack()
         """Updates that are held back while the last frame is under way to the terminal."""
-        self._is_held = False
+        self.is_held = False
 
     def get_driver_class(self) -> type[Driver]:
         self.link = Link()  # Textual asks for the driver's class while the app is built
@@ -142,21 +142,21 @@ class CareApp(App[int], inherit_bindings=False):
     def post_display_hook(self) -> None:
         """A frame was drawn: what changes from now on waits until the terminal has shown it."""
         self.link.drawn()
-        if self.link.is_busy and not self._is_held:
-            self._is_held = True
+        if self.link.is_busy and not self.is_held:
+            self.is_held = True
             self._held.enter_context(self.batch_update())
             self.set_timer(_FREE_S, self._release_when_free)
 
     def _release_when_free(self) -> None:
-        if self.link.is_busy and self._is_held:
+        if self.link.is_busy and self.is_held:
             self.set_timer(_FREE_S, self._release_when_free)
         else:
             self.release()
 
     def release(self) -> None:
         """Draw what was held back."""
-        if self._is_held:
-            self._is_held = False
+        if self.is_held:
+            self.is_held = False
             self._held.close()
             self.screen.check_idle()
 

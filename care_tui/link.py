@@ -31,10 +31,9 @@ def _takes_nothing() -> bool:
 class Link:
     """What is under way to the terminal. `write` sends to it; nothing is sent while there is none."""
 
-    def __init__(
-        self, write: Callable[[str], None] | None = None, is_full: Callable[[], bool] = _takes_nothing
-    ) -> None:
-        self.write, self._is_full = write, is_full
+    def __init__(self, is_full: Callable[[], bool] = _takes_nothing) -> None:
+        self.write: Callable[[str], None] | None = None
+        self._is_full = is_full
         self._answers = False
         self._asked_s: float | None = None
 

@@ -68,6 +68,8 @@ class CausesPage(DiagnosisPage):
         Binding("o", "next_fault", "Next fault", id="causes.next-fault"),
     ]
     _is_open = False
+    _wanted: str | None = None
+    """The cause that the cursor follows to its new place."""
 
     def compose(self) -> ComposeResult:
         with Container(id="left"):
@@ -80,7 +82,9 @@ class CausesPage(DiagnosisPage):
     def view_of_diagnosis(self) -> View:
         ranked = self.ranked()
         listing = Listing(len(ranked), lambda i, width: self._item(ranked[i], width), lambda i: f"{ranked[i].name}")
-        return View(self._title(), self._detail, listing, about="What shows it, and how it led to the fault")
+        names, wanted, self._wanted = [one.name for one in ranked], self._wanted, None
+        index = names.index(wanted) if wanted in names else None
+        return View(self._title(), self._detail, listing, index, about="What shows it, and how it led to the fault")
 
     def ranked(self) -> list[Explanation]:
         """Parts, parameters, what was met and chance in one ranking, then the causes that it does not name, and those
@@ -282,6 +286,7 @@ class CausesPage(DiagnosisPage):
         if option is None:
             return
         if option in self.session.dismissed:
+            self._wanted = option
             self._decided(self.session.take_back(option), f"{option} is back in the fix.")
             return
         prompt = Prompt(f"Set {option} aside", hint="Why? It goes into the report. Enter keeps it, Esc cancels.")
@@ -289,6 +294,7 @@ class CausesPage(DiagnosisPage):
 
     def _dismissed(self, option: str, reason: str | None) -> None:
         if reason:
+            self._wanted = option
             changed = self.session.set_aside(option, reason)
             self._decided(changed, f"{option} was also taken out of the fix.")
 

@@ -56,6 +56,8 @@ class DiffPage(DiagnosisPage):
         case, fix, side = self.session.case, self.session.fix, self.side
         if case is None or fix is None or not (fix.changes or side == "changed") or not self.has_content:
             return
+        if self.session.only_asked:
+            return
         engine, decided = self.workspace.engine, self.session.decided()
         commands = engine.commands if side == "driven" else lambda _diagnosis: []
         self.fetched(DIFF, lambda: (engine.diff(case, fix, side), commands(decided)))
@@ -68,6 +70,8 @@ class DiffPage(DiagnosisPage):
         if isinstance(answer, tuple):
             diff, commands = answer
             return View(title, lambda _: Rows([*diff_rows(diff or "No difference.\n").rows, *command_rows(commands)]))
+        if session.only_asked:
+            return View(Content("Nothing is advised"), lambda _: sentence(session.only_asked))
         if session.basket.ticked and session.fix_error is not None:
             error = session.fix_error
             return View(title, lambda _: error_rows(error))
@@ -114,8 +118,8 @@ class DiffPage(DiagnosisPage):
     def action_apply(self) -> None:
         """Put the change into the operator's file, once that is confirmed; the old one is kept beside."""
         case, fix = self.session.case, self.session.fix
-        if case is None or fix is None or not fix.changes:
-            self.say("No change is ticked in the fix (4).")
+        if case is None or fix is None or not fix.changes or self.session.only_asked:
+            self.say(self.session.only_asked or "No change is ticked in the fix (4).")
         elif not case.configs:
             self._ask_for_file()
         else:

@@ -9,10 +9,9 @@ from textual.content import Content
 
 from care_core.application.case import changes_of, fixes
 from care_core.diagnose.records import Fix
-from care_core.errors import CareError
 from care_core.text import clean
 from care_core.variables import Variable
-from care_tui.basket import nudged, parsed, possible
+from care_tui.basket import is_advisable, nudged, parsed, possible
 from care_tui.messages import Decided
 from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to
@@ -52,6 +51,7 @@ class FixPage(DiagnosisPage):
     def take(self, question: str, answer: object) -> None:
         if question == UNCHANGED and isinstance(answer, Fix):  # without it the odds stand alone, which is no failure
             self.session.unchanged = answer
+            self.post_message(Decided(has_changed_fix=False))
         super().take(question, answer)
 
     def view_of_diagnosis(self) -> View:
@@ -105,6 +105,8 @@ class FixPage(DiagnosisPage):
                  for note in change.notes]  # fmt: skip
         if option.safety and value is not None and value != option.default:
             notes.append("a safety parameter: think twice before it leaves its default")
+        if value is not None and not is_advisable(option, value):
+            notes.append("it can be asked about, and does not go into the report")
         if option.name in session.dismissed:
             notes.append(f"set aside: {session.dismissed[option.name]}")
         return notes
@@ -147,7 +149,7 @@ class FixPage(DiagnosisPage):
         def check(typed: str) -> str:
             try:
                 parsed(option, typed)
-            except (ValueError, CareError) as err:
+            except ValueError as err:
                 return str(err)
             return ""
 

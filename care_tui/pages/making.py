@@ -32,3 +32,10 @@ def make_page(name: str, workspace: Workspace, id: str) -> Page:
     module = import_module(f"care_tui.pages.{_MODULES.get(name, name)}")
     page: Page = getattr(module, _CLASSES[name])(workspace, id=id)
     return page
+
+
+def page_classes() -> list[type[Page]]:
+    """Every kind of page."""
+    return [
+        getattr(import_module(f"care_tui.pages.{_MODULES.get(name, name)}"), kind) for name, kind in _CLASSES.items()
+    ]

@@ -181,8 +181,10 @@ class Page(Container):
 
     @on(OptionList.OptionSelected, "#list")
     async def _chosen(self, event: OptionList.OptionSelected) -> None:
-        """A click moves the cursor; Enter goes on."""
+        """A click moves the cursor, and goes on where it was there already."""
         event.stop()
+        if event.option_index == self.choices.clicked_on:
+            await self.run_action("open")
 
     @on(Reader.Fitted)
     def _fit(self, event: Reader.Fitted) -> None:

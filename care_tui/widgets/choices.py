@@ -80,6 +80,8 @@ class Choices(OptionList, inherit_bindings=False):
         self._height = 0
         self._filter = ""
         self._painted: dict[int, Content] = {}
+        self.clicked_on: int | None = None
+        """Where the cursor was when the mouse was clicked last."""
 
     @property
     def index(self) -> int | None:
@@ -149,6 +151,9 @@ class Choices(OptionList, inherit_bindings=False):
             return Strip.blank(self.size.width, self.visual_style.rich_style)
         strip = Visual.to_strips(self, line, line.cell_length, 1, style)[0]
         return strip.simplify().apply_meta({"option": place})
+
+    def on_click(self) -> None:
+        self.clicked_on = self.highlighted
 
     def on_resize(self, event: Resize) -> None:
         event.prevent_default()  # Textual would paint all of it

@@ -59,11 +59,11 @@ def test_a_plot_says_in_words_what_it_shows() -> None:
         [1.0, 9.0, 2.0], limits=(Limit(8.0, "ceiling"),), bands=(Band(1.0, 2.0, "critical", "motor 4 lost thrust"),)
     )
     marks = (Mark(0.0, "arming", "armed", 3), Mark(1.0, "critical", "motor 4 lost thrust", 0))
-    figure = ElementTree.fromstring("".join(plot_figure(plot, Drawing(marks=marks, end_s=2.0, is_mission=True), "p")))
+    figure = ElementTree.fromstring("".join(plot_figure(plot, Drawing(marks=marks, end_s=2.0), "p")))
     svg = next(figure.iter("svg"))
     assert svg.get("role") == "img"
     told = next(one.text or "" for one in figure.iter("desc"))
-    for part in ("from the start of the mission", "Alt: 1 to 9 m", "ceiling: 8 m", "motor 4 lost thrust from 1.0 s"):
+    for part in ("from the start of the log", "Alt: 1 to 9 m", "ceiling: 8 m", "motor 4 lost thrust from 1.0 s"):
         assert part in told
     assert [one.text for one in figure.iter("span") if "sign" in one.get("class", "")] == ["1", "2"]
     assert "ceiling: 8 m" in [one.text for one in figure.iter("span")]
