@@ -7,17 +7,16 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterable
-from contextlib import ExitStack
+from collections.abc import Generator, Iterable
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from textual.app import App, SystemCommand
-from textual.await_complete import AwaitComplete
 from textual.binding import ActiveBinding, Binding, BindingType
 from textual.driver import Driver
-from textual.events import CursorPosition, Paste, Resize
+from textual.events import CursorPosition, Paste
 from textual.reactive import Reactive
 from textual.screen import Screen
 from textual.scrollbar import ScrollBar, ScrollBarRender
@@ -96,6 +95,8 @@ class CareApp(App[int], inherit_bindings=False):
         self._held = ExitStack()
         """Updates that are held back while the last frame is under way to the terminal."""
         self.is_held = False
+        self._batches = 0
+        self._lost_a_frame = False
 
     def get_driver_class(self) -> type[Driver]:
         self.link = Link()  # Textual asks for the driver's class while the app is built
@@ -139,8 +140,25 @@ class CareApp(App[int], inherit_bindings=False):
         if self.link.write is not None:
             self.link.write(sequence)
 
+    @contextmanager
+    def batch_update(self) -> Generator[None, None, None]:
+        """Hold all repaints back. What Textual would draw at once meanwhile, as after a change of size, it drops: then
+        all is painted at the end."""
+        self._batches += 1
+        try:
+            with super().batch_update():
+                yield
+        finally:
+            self._batches -= 1
+            if self._lost_a_frame and not self._batches:
+                self._lost_a_frame = False
+                self.screen.refresh()
+
     def post_display_hook(self) -> None:
         """A frame was drawn: what changes from now on waits until the terminal has shown it."""
+        if self._batches:
+            self._lost_a_frame = True
+            return
         self.link.drawn()
         if self.link.is_busy and not self.is_held:
             self.is_held = True
@@ -163,17 +181,6 @@ class CareApp(App[int], inherit_bindings=False):
     def on_cursor_position(self, _event: CursorPosition) -> None:
         self.link.answered()
         self.release()
-
-    def on_resize(self, _event: Resize) -> None:
-        self.release()  # Textual lays the screen out at once, and what it draws must not be lost
-
-    def push_screen(self, *args: Any, **kwargs: Any) -> Any:
-        self.release()
-        return super().push_screen(*args, **kwargs)
-
-    def pop_screen(self) -> AwaitComplete:
-        self.release()
-        return super().pop_screen()
 
     async def on_paste(self, event: Paste) -> None:
         """A file that is dropped on the terminal arrives as its pasted path."""
