@@ -150,7 +150,7 @@ class CareApp(App[int], inherit_bindings=False):
                 yield
         finally:
             self._batches -= 1
-            if self._lost_a_frame and not self._batches:
+            if self._lost_a_frame and not self._batches and self.screen_stack:
                 self._lost_a_frame = False
                 self.screen.refresh()
 

@@ -14,7 +14,7 @@ from textual.containers import Horizontal
 from textual.reactive import Reactive
 from textual.screen import Screen
 from textual.widget import Widget
-from textual.widgets import ContentSwitcher, Static, Tabs
+from textual.widgets import ContentSwitcher, Static
 from textual.worker import get_current_worker
 
 from care_core.application.case import Case, Request
@@ -193,12 +193,11 @@ class CaseScreen(Screen[None]):
         event.stop()
         await self._go(event.page, event.moment_s, event.subject)
 
-    @on(Tabs.TabActivated)
-    async def _tab_chosen(self, event: Tabs.TabActivated) -> None:
+    @on(TabRow.Chosen)
+    async def _tab_chosen(self, event: TabRow.Chosen) -> None:
         event.stop()
-        if event.tab.id is not None and event.tab.id != self.here:
-            await self.action_go(event.tab.id)
-            self._mark()
+        await self.action_go(event.page)
+        self._mark()
 
     async def action_back(self) -> None:
         bar = self.query_one(FilterBar)

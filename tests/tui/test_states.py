@@ -89,6 +89,8 @@ async def test_enter_while_reading_does_not_start_the_reading_again(tmp_path: Pa
     async with app.run_test(size=(80, 24)) as pilot:
         slow.reached.wait(5)
         await pilot.pause(0.1)
+        await pilot.press("L")
+        await pilot.pause(0.3)
         assert "a.BIN" in items(app)
         await pilot.press("enter", "enter")
         await pilot.pause(0.1)
@@ -96,7 +98,8 @@ async def test_enter_while_reading_does_not_start_the_reading_again(tmp_path: Pa
         assert "being read" in app.title
         slow.go_on.set()
         await settle(pilot)
-        assert step_of(app) == 2
+        assert walk(app).session.state == "data"
+        assert walk(app).here == "logs", "the operator is left where they are"
     assert asked == [log]
 
 
@@ -158,12 +161,12 @@ async def test_without_a_log_the_first_step_lists_what_there_is(make_app: MakeAp
     )
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert step_of(app) == 1
+        assert walk(app).here == "logs"
         assert "old.BIN" in items(app)
         await settle(pilot, "3")
         assert "No log is open" in text(app)
         (tmp_path / "new.BIN").write_bytes(b"xy")
-        await settle(pilot, "1", "R")
+        await settle(pilot, "L", "R")
         assert "new.BIN" in items(app)
         await settle(pilot, "enter")
         await settle(pilot)
@@ -200,7 +203,7 @@ async def test_o_opens_any_log_by_its_path(make_app: MakeApp, tmp_path: Path) ->
         await settle(pilot, "enter")
         assert "no such file" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
         await settle(pilot, "escape")
-        assert step_of(app) == 1
+        assert walk(app).here == "logs"
 
 
 async def test_a_file_dropped_on_the_terminal_is_opened(make_app: MakeApp, tmp_path: Path) -> None:
