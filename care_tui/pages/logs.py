@@ -26,6 +26,7 @@ from care_tui.pages.page import Page, View, enter_to
 from care_tui.places import LogFile, found_logs
 from care_tui.render.rows import Row, Rows, error_rows, labelled, status, text
 from care_tui.screens.open_log import OpenLogDialog
+from care_tui.session import Session
 from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
 
@@ -65,6 +66,11 @@ class LogsPage(Page):
     def __init__(self, workspace: Workspace, *, id: str | None = None) -> None:
         super().__init__(workspace, id=id)
         self._known: dict[Path, Known] = {}
+
+    @property
+    def session(self) -> Session:
+        """That of the log that is open now: this page stays."""
+        return self.workspace.session
 
     def enter(self) -> None:
         places, opened = self.workspace.places, self.session.path

@@ -28,7 +28,7 @@ class MessagesPage(Page):
         "to the next marked one, Enter to its moment in the plots, / filters, Esc leaves."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
-        enter_to("Its moment in the plots"),
+        enter_to("Plots"),
         Binding("n", "next_marked", "Next marked", id="messages.next"),
     ]
     _wanted: float | None = None

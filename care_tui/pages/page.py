@@ -56,6 +56,7 @@ class Page(Container):
     def __init__(self, workspace: Workspace, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self.workspace = workspace
+        self._own_session = workspace.session
         self._view = View(Content(), lambda _: Rows([]))
         self._answers: dict[str, object] = {}
         self._asked: set[str] = set()
@@ -66,7 +67,8 @@ class Page(Container):
 
     @property
     def session(self) -> Session:
-        return self.workspace.session
+        """That of the log that the page was made for: another log has other pages."""
+        return self._own_session
 
     @property
     def glyphs(self) -> Glyphs:

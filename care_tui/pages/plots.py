@@ -40,7 +40,7 @@ class PlotsPage(Page):
     )
     FITS = True
     BINDINGS: ClassVar[list[BindingType]] = [
-        enter_to("Messages of the moment"),
+        enter_to("Messages"),
         Binding("plus,right_square_bracket", "zoom(0.5)", "Closer", key_display="+", id="signals.closer"),
         Binding("minus,left_square_bracket", "zoom(2.0)", "Farther", key_display="-", id="signals.farther"),
         Binding("n", "next_marked", "Next mark", id="signals.next"),

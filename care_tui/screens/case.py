@@ -47,6 +47,8 @@ WIDE, WIDEST = 120, 160
 """From these widths on list and text stand side by side, and then cause, proof and fix."""
 ROOMY = 30
 """From this height on panes have a frame, below it only a line above."""
+STEPS_WIDTH, SHORTEST_NAME = 59, 12
+"""Cells that the tabs of the steps take, and below which the name of a log tells nothing."""
 DIAGNOSIS, PREDICTION = "diagnosis", "prediction"
 
 
@@ -150,7 +152,10 @@ class CaseScreen(Screen[None]):
         empty = session.empty_steps()
         self.query_one("#step-tabs", TabRow).mark(self.here, empty)
         self.query_one("#view-tabs", TabRow).mark(self.here, [page.name for page in VIEWS if self._lacks(page.name)])
-        name = "" if session.path is None else clean(session.path.name)
+        room = self.app.size.width - STEPS_WIDTH
+        name = "" if session.path is None or room < SHORTEST_NAME else clean(session.path.name)
+        if len(name) > room:
+            name = name[: room - 1] + self.workspace.glyphs.more
         shown = self.query_one("#log-name", Static)
         if shown.content != name:
             shown.update(name)
