@@ -215,8 +215,10 @@ def whole_of(case: OpenRun) -> tuple[float, float]:
 
 def settled_s(diagnosis: Diagnosis) -> float:
     """When the run was over, crashed or back on the ground: what is measured later tells nothing of it."""
+    from care_core.ecosystems.findings import every_finding
+
     health = diagnosis.health
-    down = [one.onset_s for one in health.findings if one.kind == "crash"]
+    down = [one.onset_s for one in every_finding(health.findings) if one.kind == "crash"]
     down += [one.time_s for one in health.timeline if one.kind == "crash" or one.text == "landed"]
     return max(down) if down else math.inf
 

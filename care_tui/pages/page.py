@@ -161,8 +161,8 @@ class Page(Container):
     def filter(self, words: str) -> None:
         """Show only what holds these words."""
         if self.choices.display:
-            self.choices.filter(words)
-            self._follow_cursor()
+            if self.choices.filter(words):
+                self._follow_cursor()
         else:
             self.reader.filter(words)
 

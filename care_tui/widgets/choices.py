@@ -99,11 +99,14 @@ class Choices(OptionList, inherit_bindings=False):
         self.listing = listing
         self._fill(index)
 
-    def filter(self, words: str) -> None:
-        """Show only the items that hold these words; all of them when empty. No message is sent."""
-        if words.casefold() != self._filter:
-            here, self._filter = self.index, words.casefold()
-            self._fill(here)
+    def filter(self, words: str) -> bool:
+        """Show only the items that hold these words; all of them when empty. False where that changes nothing. No
+        message is sent."""
+        if words.casefold() == self._filter:
+            return False
+        here, self._filter = self.index, words.casefold()
+        self._fill(here)
+        return True
 
     def _fill(self, index: int | None) -> None:
         count, words, height = self.listing.count, self.listing.words, self.listing.height

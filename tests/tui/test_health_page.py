@@ -218,6 +218,9 @@ async def test_an_objective_is_judged_by_another_threshold() -> None:
         assert step_of(app) == 2
         assert index(app) == 2, "the cursor is where it was"
         assert "<= 12 Wh" in items(app)
+        assert ["mine" in line for line in items(app).splitlines()] == [False, True, True, False], (
+            "both limits are mine"
+        )
         await settle(pilot, "equals_sign", "backspace", "backspace", "enter")
         await settle(pilot)
         assert asked[-1] == {"mission_time": 150.0}

@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from textual.widgets import Tabs
+from textual.widgets import Input, Static, Tabs
 
 from care_core.application.case import Case, Request
 from care_core.errors import UsageError
@@ -16,6 +16,7 @@ from care_tui.app import CareApp
 from care_tui.pages.history import HistoryPage
 from care_tui.render.plot import dots_across, plot
 from care_tui.screens.case import CaseScreen
+from care_tui.screens.confirm import Confirm
 from care_tui.settings import Settings
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
@@ -168,6 +169,56 @@ async def test_the_file_on_disk_is_patched_with_its_comments_kept(tmp_path: Path
         await settle(pilot, "f")
         assert "! LAND_SPEED  16 -> 20" in text(app)
     assert "LAND_SPEED,20" in file.read_text(), "nothing is written"
+
+
+@needs_sample
+async def test_the_change_is_put_into_the_file_that_is_asked_for_and_the_old_one_is_kept(tmp_path: Path) -> None:
+    file = tmp_path / "robot.param"
+    before = "# landing, agreed with Anna\nLAND_SPEED,16  # slow\nWPNAV_SPEED,1000\n"
+    file.write_text(before)
+    app = real()
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "5", "A")
+        app.screen.query_one(Input).value = str(tmp_path / "none.param")
+        await settle(pilot, "enter")
+        assert "no such file" in str(app.screen.query_one(".error", Static).content)
+        app.screen.query_one(Input).value = str(file)
+        await settle(pilot, "enter")
+        assert "+LAND_SPEED,40  # slow" in text(app)
+        await settle(pilot, "A")
+        assert isinstance(app.screen, Confirm)
+        await settle(pilot, "n")
+        assert file.read_text() == before, "nothing is written unasked"
+        await settle(pilot, "A", "y")
+        assert "the old one is robot.param.bak" in app.title
+    assert file.read_text() == before.replace("16", "40")
+    assert (tmp_path / "robot.param.bak").read_text() == before
+
+
+@needs_sample
+async def test_a_folder_lists_its_logs_with_verdicts_and_enter_opens_one(tmp_path: Path) -> None:
+    (tmp_path / "flight.BIN").write_bytes(SAMPLE.read_bytes())
+    (tmp_path / "broken.BIN").write_bytes(b"x" * 100)
+    app = CareApp(Request(tmp_path, top=10), settings=Settings(places=()))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot)
+        assert walk(app).here == "logs"
+        told = {line.split()[-1] if "UNREADABLE" in line else "flight": line for line in items(app).splitlines()}
+        assert any("FAULT" in line and "mission_time" in line for line in told.values())
+        assert any("UNREADABLE" in line for line in told.values())
+        await settle(pilot, "slash", *"flight", "enter", "enter")
+        await settle(pilot)
+        assert walk(app).here == "objectives"
+
+
+@needs_sample
+async def test_the_map_shows_the_track_and_the_corners_that_were_asked_for() -> None:
+    app = real()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "M")
+        assert title(app) == "Track and the way asked for"
+        assert text(app).count("o") >= 5
+        assert any("\u2800" < sign <= "\u28ff" for sign in text(app))
 
 
 @needs_sample

@@ -307,6 +307,17 @@ async def test_an_objective_that_was_not_evaluated_has_no_causes_but_a_reason(ma
         assert "LOG_BITMASK" in text(app)
 
 
+async def test_enter_on_what_was_not_evaluated_leads_to_the_fault_that_has_causes(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "G")
+        assert "path_error" in items(app).splitlines()[index(app) or 0]
+        await settle(pilot, "enter")
+        assert title(app).startswith("Causes of mission_time")
+        assert "LAND_SPEED" in items(app)
+        assert "these are the causes of mission_time" in app.title
+
+
 async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app: MakeApp) -> None:
     lead = replace(sample.FLIES_SLOWLY, rank=1, is_lead=True, contribution=0.0)
     wind = Circumstance("wind", "wind_proxy", 9.0, "m/s", 0.0, 6.0, 0.01, "stronger than in 99 % of the training runs")
