@@ -89,9 +89,9 @@ async def test_no_key_fails_without_a_log(step: str) -> None:
 def test_the_documentation_names_every_key_of_the_walk_and_the_views() -> None:
     table = APP_MD.read_text(encoding="utf-8")
     written = set(re.findall(r"`([^`]+)`", table)) | set(re.findall(r"F\d", table))
-    signs = {"plus": "+", "minus": "-", "equals_sign": "="}
+    signs = {"plus": "+", "minus": "-", "equals_sign": "=", "slash": "/"}
     for binding in (*CaseScreen.BINDINGS, *DOES):
         assert isinstance(binding, Binding)
         names = [signs.get(key, key.upper() if re.fullmatch(r"f\d", key) else key) for key in binding.key.split(",")]
-        named = written & {*names} or {"space", "left", "right", "enter"} & {*names}
+        named = written & {*names} or {"space", "left", "right", "enter", "escape", "tab", "shift+tab"} & {*names}
         assert named or str(binding.id).startswith("step."), binding
