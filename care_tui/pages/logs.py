@@ -95,12 +95,15 @@ class LogsPage(Page):
         if self.workspace.folder is None or self.workspace.request is None:
             return
         for log in logs:
-            if log.path not in remembered and not worker.is_cancelled:
-                self.post_message(
-                    self.Told(log.path, self._verdict(replace(self.workspace.request, log=log.path), worker))
-                )
+            if log.path in remembered:
+                continue
+            known = self._verdict(replace(self.workspace.request, log=log.path), worker)
+            if known is None:
+                return
+            self.post_message(self.Told(log.path, known))
 
-    def _verdict(self, request: Request, worker: Worker[object]) -> Known:
+    def _verdict(self, request: Request, worker: Worker[object]) -> Known | None:
+        """The verdict on a log, None where the work was taken back."""
         engine = self.workspace.engine
 
         def go_on(_step: str, _share: float) -> None:
@@ -111,7 +114,7 @@ class LogsPage(Page):
             case = engine.diagnose(request, go_on)
             engine.remember(case.diagnosis, request)
         except CancelledError:
-            return Known("not_evaluated", "")
+            return None
         except Exception as err:
             return Known("unreadable", as_care_error(err).message)
         verdict = verdict_of(case.diagnosis)
