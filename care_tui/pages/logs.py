@@ -57,7 +57,7 @@ class LogsPage(Page):
     ]
 
     @dataclass
-    class Told(Message):
+    class Verdict(Message):
         """The verdict on a log has come."""
 
         path: Path
@@ -91,7 +91,7 @@ class LogsPage(Page):
         worker = get_current_worker()
         remembered = known_verdicts({log.path: log.modified_s for log in logs})
         for path, (verdict, words) in remembered.items():
-            self.post_message(self.Told(path, Known(verdict, words)))
+            self.post_message(self.Verdict(path, Known(verdict, words)))
         if self.workspace.folder is None or self.workspace.request is None:
             return
         for log in logs:
@@ -100,7 +100,7 @@ class LogsPage(Page):
             known = self._verdict(replace(self.workspace.request, log=log.path), worker)
             if known is None:
                 return
-            self.post_message(self.Told(log.path, known))
+            self.post_message(self.Verdict(log.path, known))
 
     def _verdict(self, request: Request, worker: Worker[object]) -> Known | None:
         """The verdict on a log, None where the work was taken back."""
@@ -120,8 +120,8 @@ class LogsPage(Page):
         verdict = verdict_of(case.diagnosis)
         return Known(verdict.status, verdict.failed)
 
-    @on(Told)
-    def _tell(self, event: Told) -> None:
+    @on(Verdict)
+    def _tell(self, event: Verdict) -> None:
         event.stop()
         self._known[event.path] = event.known
         if self.display:
