@@ -81,7 +81,7 @@ def serve_made() -> None:
 
     prepare_terminal(Settings())
     from care_tui.app import CareApp
-    from care_tui.jobs import Engine
+    from care_tui.engine import Engine
 
     diagnosis, options = made()
     fix = diagnosis.fix

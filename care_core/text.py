@@ -74,6 +74,10 @@ def wrapped(text: str, first: str = "", rest: str | None = None, width: int = WI
     return [line.replace("\u00a0", " ") for line in lines]  # what must stand on one line was held together by them
 
 
+LONG_S = 600.0
+"""From here on a time of a log has the form of minutes alone where there is little room."""
+
+
 def log_time(time_s: float | None, digits: int = 1) -> str:
     """A time of a log, or how long one lasts, wherever people read it: 61.3 s, from 100 s on 312.4 s (5:12)."""
     if time_s is None or not math.isfinite(time_s):
@@ -98,7 +102,7 @@ def seconds(time_s: float | None) -> str:
     """A time of a log where a column of the app is narrow: 61.3 s, from ten minutes on 12:05, from an hour 1:02:05."""
     if time_s is None or not math.isfinite(time_s):
         return "?"
-    return f"{time_s:.1f} s" if abs(time_s) < 600 else _minutes(time_s)
+    return f"{time_s:.1f} s" if abs(time_s) < LONG_S else _minutes(time_s)
 
 
 def _minutes(time_s: float) -> str:

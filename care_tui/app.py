@@ -7,13 +7,15 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
 from textual.app import App, SystemCommand
-from textual.binding import Binding, BindingType
+from textual.binding import ActiveBinding, Binding, BindingType
+from textual.driver import Driver
 from textual.events import CursorPosition, Paste
 from textual.reactive import Reactive
 from textual.screen import Screen
@@ -22,24 +24,27 @@ from textual.scrollbar import ScrollBar, ScrollBarRender
 from care_core.application.case import Case, Request
 from care_core.diagnose.verdict import verdict_of
 from care_core.errors import CareError, ExitCode, UsageError, nearest
+from care_tui.engine import Engine
 from care_tui.hangup import on_hangup
-from care_tui.jobs import Engine
-from care_tui.link import Link
+from care_tui.link import Link, linked
+from care_tui.page_names import LOGS, STEPS, VIEWS
 from care_tui.places import as_path, is_openable
 from care_tui.render.rows import ASCII, UNICODE
-from care_tui.screens.base import CareScreen
+from care_tui.screens.case import CaseScreen
 from care_tui.screens.help import HelpScreen, Keys
-from care_tui.screens.panes import PanesScreen
-from care_tui.screens.walk import VIEWS, WalkScreen
 from care_tui.settings import SERVER, Settings
-from care_tui.themes import DEFAULT, HIGH_CONTRAST
-from care_tui.widgets.step_bar import STEPS
+from care_tui.themes import DEFAULT, HIGH_CONTRAST, OWN_COLOURS
+from care_tui.threads import DaemonThreads
+from care_tui.tracebacks import shorten
+from care_tui.workspace import Workspace
 
 _LEAVE_S, _MOST_S = 0.05, 3.0
 """How often an app that is about to end looks whether the terminal's last answer is there: a shell would take it for
 typed."""
 _LOOK_S = 2.0
 """How often an app in a browser looks for its server."""
+_FREE_S = 0.05
+"""How often is looked whether the terminal has shown the last frame, where it does not say so itself."""
 
 
 class PlainScrollBar(ScrollBarRender):
@@ -82,16 +87,31 @@ class CareApp(App[int], inherit_bindings=False):
             self.theme = settings.theme
         self.set_keymap(dict(settings.keys))
         self.set_class(settings.ascii, "-ascii")
-        self.link = Link(self.write_control, self._writes_waiting)
         self.code = ExitCode.INTERRUPTED if request else ExitCode.OK
-        self._glyphs = ASCII if settings.ascii else UNICODE
-        self._walk = WalkScreen(engine or Engine(), settings, self._glyphs, request=request)
+        glyphs = ASCII if settings.ascii else UNICODE
+        folder = None if request is None or not is_folder_of_logs(request.log) else request.log.absolute()
+        self.workspace = Workspace(engine or Engine(), settings, glyphs, request, folder=folder)
+        self._case = CaseScreen(self.workspace)
+        self._held = ExitStack()
+        """Updates that are held back while the last frame is under way to the terminal."""
+        self.is_held = False
+        self._batches = 0
+        self._lost_a_frame = False
+
+    def get_driver_class(self) -> type[Driver]:
+        self.link = Link()  # Textual asks for the driver's class while the app is built
+        return linked(super().get_driver_class(), self.link)
+
+    def get_css_variables(self) -> dict[str, str]:
+        own = OWN_COLOURS if self.theme == DEFAULT else {}
+        return {**super().get_css_variables(), "frame": "ansi_bright_black", **own}
 
     def on_mount(self) -> None:
+        asyncio.get_running_loop().set_default_executor(DaemonThreads())
         self._end_on_signals()
         if SERVER in os.environ:
             self.set_interval(_LOOK_S, self._end_with_server)
-        self.push_screen(self._walk)
+        self.push_screen(self._case)
 
     def _end_on_signals(self) -> None:
         """A lost connection or a polite kill ends the app as `q` does, so the terminal is given back as it was."""
@@ -113,38 +133,62 @@ class CareApp(App[int], inherit_bindings=False):
         """Remember what the last diagnosis means for the exit code."""
         self.code = answer.exit_code if isinstance(answer, CareError) else verdict_of(answer.diagnosis).exit_code
 
+    # The link to the terminal
+
     def write_control(self, sequence: str) -> None:
         """Send a control sequence to the terminal."""
-        if self._driver is not None:
-            self._driver.write(sequence)
+        if self.link.write is not None:
+            self.link.write(sequence)
 
-    def _writes_waiting(self) -> int:
-        """Writes that the thread which writes to the terminal has not begun; drivers without one keep none."""
-        thread = getattr(self._driver, "_writer_thread", None)
-        return 0 if thread is None else int(thread._queue.qsize())
+    @contextmanager
+    def batch_update(self) -> Generator[None, None, None]:
+        """Hold all repaints back. What Textual would draw at once meanwhile, as after a change of size, it drops: then
+        all is painted at the end."""
+        self._batches += 1
+        try:
+            with super().batch_update():
+                yield
+        finally:
+            self._batches -= 1
+            if self._lost_a_frame and not self._batches and self.screen_stack:
+                self._lost_a_frame = False
+                self.screen.refresh()
 
     def post_display_hook(self) -> None:
-        if self._driver is not None and not self.is_headless and not self.is_web:
-            self.link.drawn()
+        """A frame was drawn: what changes from now on waits until the terminal has shown it."""
+        if self._batches:
+            self._lost_a_frame = True
+            return
+        self.link.drawn()
+        if self.link.is_busy and not self.is_held:
+            self.is_held = True
+            self._held.enter_context(self.batch_update())
+            self.set_timer(_FREE_S, self._release_when_free)
+
+    def _release_when_free(self) -> None:
+        if self.link.is_busy and self.is_held:
+            self.set_timer(_FREE_S, self._release_when_free)
+        else:
+            self.release()
+
+    def release(self) -> None:
+        """Draw what was held back."""
+        if self.is_held:
+            self.is_held = False
+            self._held.close()
+            self.screen.check_idle()
 
     def on_cursor_position(self, _event: CursorPosition) -> None:
         self.link.answered()
+        self.release()
 
-    def on_paste(self, event: Paste) -> None:
+    async def on_paste(self, event: Paste) -> None:
         """A file that is dropped on the terminal arrives as its pasted path."""
         path = as_path(event.text)
         if event.text.strip() and "\n" not in event.text.strip() and (path.is_file() or is_openable(path)):
-            while self.screen is not self._walk:
-                self.pop_screen()
-            self._walk.open_log(path)
-
-    def _fatal_error(self) -> None:
-        """End after a defect with its traceback, without the values of variables: a diagnosis fills megabytes."""
-        from rich.console import Group
-        from rich.traceback import Traceback
-
-        report = "This is a defect of care, not of your robot: please report it with the log."
-        self.panic(Group(Traceback(show_locals=False), report))
+            while self.screen is not self._case:
+                await self.pop_screen()
+            await self._case.open_log(path)
 
     # Keys and commands that work everywhere
 
@@ -155,17 +199,12 @@ class CareApp(App[int], inherit_bindings=False):
         self._leave(ExitCode.INTERRUPTED)
 
     def _leave(self, code: ExitCode) -> None:
-        self._cancel_all()
+        self.workers.cancel_all()
         self._exit_with(code, time.monotonic() + _MOST_S)
 
     def _lose_terminal(self) -> None:
-        self._cancel_all()
+        self.workers.cancel_all()
         self.exit(ExitCode.INTERRUPTED)
-
-    def _cancel_all(self) -> None:
-        for screen in self.screen_stack:
-            if isinstance(screen, PanesScreen):
-                screen.cancel_all()
 
     def _exit_with(self, code: ExitCode, at_the_latest_s: float) -> None:
         """Once the terminal has shown the last frame; one that takes nothing any more is not waited for."""
@@ -176,55 +215,54 @@ class CareApp(App[int], inherit_bindings=False):
 
     def action_help(self) -> None:
         screen = self.screen
-        if isinstance(screen, CareScreen):
-            self.push_screen(HelpScreen(screen.help_text(), self._keys_of(screen), screen.help_first()))
+        if isinstance(screen, CaseScreen):
+            self.push_screen(HelpScreen(screen.page.HELP, self._keys_of(screen), screen.page.help_first()))
 
-    def _keys_of(self, screen: CareScreen) -> Keys:
+    def _keys_of(self, screen: CaseScreen) -> Keys:
         """Every key that works on the screen, keys of one action together, those of the page first."""
         keys: dict[tuple[str, str], list[str]] = {}
-        for key, active in sorted(screen.active_bindings.items(), key=lambda item: _order(item[1].binding)):
+        nodes = list(screen.page.ancestors_with_self)
+
+        def order(active: ActiveBinding) -> int:
+            return -1 if active.node is screen.page else nodes.index(active.node) if active.node in nodes else 0
+
+        for key, active in sorted(screen.active_bindings.items(), key=lambda item: order(item[1])):
             binding = active.binding
             if active.enabled and binding.description and binding.id:
-                does = (
-                    screen.described(binding),
-                    binding.id.split(".")[0] if binding.id.startswith("step.") else binding.id,
+                keys.setdefault((binding.description, binding.id), []).append(
+                    self.get_key_display(binding.with_key(key))
                 )
-                keys.setdefault(does, []).append(self.get_key_display(binding.with_key(key)))
         return [(" ".join(shown), description, id) for (description, id), shown in keys.items()]
 
     def get_key_display(self, binding: Binding) -> str:
         """How a key is written; by its name where arrows and the like cannot be drawn."""
-        is_named = self._glyphs is ASCII or binding.key == "enter"
+        is_named = self.workspace.glyphs is ASCII or binding.key == "enter"
         return (binding.key_display or binding.key) if is_named else super().get_key_display(binding)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """What the command palette offers: the steps, and every action of the page."""
-        if isinstance(screen, WalkScreen):
-            for number, name in enumerate(STEPS, start=1):
-                yield SystemCommand(f"Go to {name}", f"Step {number}", lambda number=number: screen.action_go(number))
-            for view in VIEWS:
-                yield SystemCommand(view.capitalize(), VIEWS[view], lambda view=view: screen.action_view(view))
-        if isinstance(screen, PanesScreen):
-            for name in sorted(filter(screen.page.works, screen.page.ACTIONS)):
-                about = (getattr(screen.page, name).__doc__ or "").strip().splitlines()
-                yield SystemCommand(
-                    name.replace("_", " ").capitalize(), about[0] if about else "", getattr(screen.page, name)
-                )
+        """What the command palette offers: the pages by the names of their tabs, and every action of the page."""
+        if isinstance(screen, CaseScreen):
+            for page in (*STEPS, *VIEWS, LOGS):
+                yield SystemCommand(page.title, page.about, partial(screen.run_action, f"screen.go('{page.name}')"))
+            for active in screen.active_bindings.values():
+                binding = active.binding
+                if active.node is screen.page and active.enabled:
+                    action = binding.action.partition("(")[0]
+                    about = (getattr(screen.page, f"action_{action}").__doc__ or "").strip()
+                    yield SystemCommand(binding.description, about, partial(screen.page.run_action, binding.action))
         yield SystemCommand("Help", "The keys that work here", self.action_help)
         yield SystemCommand("Theme", "Change the colours", self.action_change_theme)
         yield SystemCommand("Quit", "Leave care", self.action_quit)
 
 
-def _order(binding: Binding) -> int:
-    """Where a key belongs in the list of keys: what only this page can do first, what works everywhere last."""
-    places = ("do(", "open", "back", "filter", "go(", "view(", "move(")
-    if binding.priority and not binding.action.startswith("do("):
-        return len(places) + 1
-    return next((place for place, start in enumerate(places) if binding.action.startswith(start)), len(places))
+def is_folder_of_logs(path: Path) -> bool:
+    """Whether this is a folder to choose a log from, and no recording that is a folder."""
+    return path.is_dir() and not is_openable(path)
 
 
 def run(request: Request | None, settings: Settings) -> int:
     """Open the app; answers the exit code."""
+    shorten()
     app = CareApp(request, settings=settings)
     answer = app.run(mouse=settings.mouse)
     return int(ExitCode.USAGE if answer is None else answer)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from care_core.configs.driven import option_value
 from care_core.records import Struct, field
+from care_core.run import Setting
 from care_core.variables import Variable
 
 NUDGES = 20
@@ -79,19 +81,21 @@ def nudged(option: Variable, value: float, by: int) -> float:
 
 
 def parsed(option: Variable, text: str) -> float:
-    """What the operator typed for an option: a number, a label, or true and false.
+    """What the operator typed for an option, as `care whatif` takes it: a number, a label, or true and false.
 
     Raises:
-        ValueError: it is none of these, or not an acceptable value; the message says what is.
+        ValueError: it is none of these; the message says what is.
     """
-    value = option.typed(text)
+    value = option_value(option, Setting(option.name, text, "typed"))
     if value is None:
         raise ValueError(f"'{text}' is not a number. {possible(option)}")
-    # snap() also rounds floats, which is no reason to refuse what was typed.
-    whole = option.type not in ("int", "bool") or value == round(value)
-    if not option.accepts(value) or not whole:
-        raise ValueError(f"{text} is not acceptable. {possible(option)}")
     return value
+
+
+def is_advisable(option: Variable, value: float) -> bool:
+    """Whether a change may go into a report: others can only be asked about."""
+    whole = option.type not in ("int", "bool") or value == round(value)
+    return option.accepts(value) and whole
 
 
 def possible(option: Variable) -> str:

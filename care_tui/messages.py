@@ -1,20 +1,22 @@
-"""What screens, widgets and workers tell each other: past-tense facts with a typed payload."""
+"""What pages and workers tell the screen: past-tense facts and wishes with a typed payload."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from textual.message import Message
 
-from care_tui.jobs import Job
+from care_core.application.case import Request
+from care_core.application.proof import Subject
 
 
 @dataclass
 class Progressed(Message):
     """The engine reached a step; `fraction` of the whole work is done (0 to 1)."""
 
+    request: Request
     step: str
     fraction: float
 
@@ -23,16 +25,40 @@ class Progressed(Message):
 
 
 @dataclass
-class Fetched(Message):
-    """A worker has an answer, or the CareError that says why it has none; `receive` takes it on the screen's side."""
+class Answered(Message):
+    """A worker has an answer to a question, or the CareError that says why it has none."""
 
-    job: Job
-    receive: Callable[[Any], None]
+    question: str
     answer: Any
 
 
 @dataclass
-class StepChosen(Message):
-    """The operator wants to see another step of the walk, counted from 1."""
+class Go(Message):
+    """The operator wants another page, at a moment of the log or at the proof of something where one is named."""
 
-    step: int
+    page: str
+    moment_s: float | None = None
+    subject: Subject | None = None
+
+
+@dataclass
+class OpenLog(Message):
+    """Another log is to be opened."""
+
+    path: Path
+
+
+@dataclass
+class Judge(Message):
+    """The log is to be judged as this request says; the operator waits at `page`, and comes back to `objective`."""
+
+    request: Request
+    page: str = "log"
+    objective: str | None = None
+
+
+@dataclass
+class Decided(Message):
+    """The operator ticked a change or set a cause aside: what follows from it is to be told anew."""
+
+    has_changed_fix: bool = True

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from care_core.application.case import Case, changes_of, decided, fixes
+from care_core.application.case import Case, changes_of, decided, fixes, weighed_without
+from care_core.application.signals import Signal
 from care_core.configs.driven import as_number
-from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult
 from care_core.errors import CareError
 from care_core.records import Struct, field, replace
 from care_core.report.formats import FILE_FORMATS, Format
 from care_core.variables import Variable
-from care_tui.basket import Basket
+from care_tui.basket import Basket, is_advisable, possible
 
 State = Literal["empty", "loading", "data", "error"]
 
@@ -36,10 +37,12 @@ class Session(Struct, eq=False):
     fix_error: CareError | None = None
     unchanged: Fix | None = None
     """What the configuration as driven would bring again."""
+    signals: list[Signal] | None = None
+    """The signals of the log, once somebody asked for them."""
     dismissed: dict[str, str] = field(default_factory=dict)
     """Causes set aside: option to reason."""
-    _left_fix: set[str] = field(default_factory=set)
-    """Options that left the fix when they were set aside."""
+    _before_aside: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Options that left the fix when they were set aside, with what was ticked before."""
     format: Format = FILE_FORMATS[0]
 
     @property
@@ -92,6 +95,33 @@ class Session(Struct, eq=False):
             (c.option.name, c.suggested): c.p_fixed for c in causes if not (c.suggested is None or c.p_fixed is None)
         }
 
+    def hypotheses(self) -> tuple[Hypothesis, ...]:
+        """What explains the failure, the causes set aside left out and the others weighed anew."""
+        return weighed_without(self.diagnosis.hypotheses, self.dismissed)
+
+    def odds_unchanged(self) -> float | None:
+        """Probability that the next run is without a fault as driven; None where that is not known."""
+        return self.diagnosis.odds_as_driven if self.unchanged is None else self.unchanged.odds
+
+    def first_fault(self) -> bool:
+        """Turn to the first objective whose fault has causes; False when there is none."""
+        places = [i for i, result in enumerate(self.diagnosis.objectives) if self.fault_of(result)]
+        if places:
+            self.objective = places[0]
+        return bool(places)
+
+    def empty_steps(self) -> tuple[str, ...]:
+        """Steps that have nothing to show of this run: Enter passes them over."""
+        if self.state != "data":
+            return ()
+        diagnosis = self.diagnosis
+        is_judged, can_change = bool(diagnosis.objectives), diagnosis.profile.fit.verdict != "no"
+        can_change = can_change and not diagnosis.run.checks
+        empty = () if is_judged else ("objectives",)
+        if not diagnosis.hypotheses and not can_change:
+            empty = (*empty, "causes")
+        return empty if can_change else (*empty, "fix", "diff")
+
     @property
     def result(self) -> ObjectiveResult | None:
         """The objective that the causes are shown of."""
@@ -113,21 +143,26 @@ class Session(Struct, eq=False):
         return () if self.fault is None else self.fault.causes
 
     def set_aside(self, option: str, reason: str) -> bool:
-        """Set a cause aside; True when that took its option out of the fix."""
+        """Set a cause aside; True when that changed the fix: the best one without it is ticked, where there is one."""
         self.dismissed[option] = reason
         if option not in self.basket.ticked:
             return False
-        self._left_fix.add(option)
-        self.basket.drop(option)
+        self._before_aside[option] = dict(self.basket.ticked)
+        others = [changes_of(fix) for fix in fixes(self.diagnosis) if not set(changes_of(fix)) & set(self.dismissed)]
+        if others:
+            self.basket.load(others[0])
+        else:
+            self.basket.drop(option)
         return True
 
     def take_back(self, option: str) -> bool:
         """Undo `set_aside`; True when that put the option back into the fix."""
         del self.dismissed[option]
-        if option not in self._left_fix:
+        before = self._before_aside.pop(option, None)
+        if before is None or option in self.basket.ticked:
             return False
-        self._left_fix.remove(option)
-        return option not in self.basket.ticked and self.basket.toggle(option)
+        self.basket.load(before)
+        return True
 
     def next_fault(self) -> bool:
         """Turn to the next faulty objective, the first after the last; False when there is no other."""
@@ -159,9 +194,20 @@ class Session(Struct, eq=False):
         run = self.diagnosis.run
         return option.name not in run.config and option.name not in run.settings
 
+    @property
+    def only_asked(self) -> str:
+        """Why what is ticked can be asked about and not advised; empty where it can be advised."""
+        options = {option.name: option for option in self.options()} if self.basket.ticked else {}
+        for name, value in self.basket.ticked.items():
+            if not is_advisable(options[name], value):
+                return (
+                    f"{name} {options[name].show(value)} is only asked about and not advised. {possible(options[name])}"
+                )
+        return ""
+
     def decided(self) -> Diagnosis:
-        """The diagnosis with the ticked changes as its fix, and the causes set aside."""
-        return decided(self.diagnosis, self.fix, self.dismissed)
+        """The diagnosis with the ticked changes as its fix, if they can be advised, and the causes set aside."""
+        return decided(self.diagnosis, None if self.only_asked else self.fix, self.dismissed)
 
     def decided_case(self) -> Case:
         """The case with that diagnosis; only asked for in the state `data`."""

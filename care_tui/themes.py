@@ -7,6 +7,15 @@ from textual.theme import Theme
 DEFAULT = "ansi-dark"
 """The terminal's own colours: right on any background, with 16 colours, and half the bytes on a slow link."""
 
+OWN_COLOURS = {
+    "accent": "ansi_cyan",
+    "text-accent": "ansi_cyan",
+    "border": "ansi_cyan",
+    "footer-key-foreground": "ansi_cyan",
+    "text-primary": "ansi_magenta",
+}
+"""One accent, which is no colour of a verdict."""
+
 HIGH_CONTRAST = Theme(
     name="high-contrast",
     primary="#ffff00",

@@ -15,13 +15,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+from textual.pilot import Pilot
+
 import care_core
 from care_core.application.case import Request
 from care_core.files import bundled, write_atomically
 from care_tui.app import CareApp
-from care_tui.screens.walk import WalkScreen
+from care_tui.page_names import STEPS
 from care_tui.settings import Settings
-from care_tui.widgets.step_bar import STEPS
 
 SIZE = (80, 24)
 SAMPLE = "arducopter_failed.BIN"
@@ -46,18 +47,21 @@ async def draw(folder: Path) -> None:
     os.chdir(bundled("samples"))  # as an operator stands beside the log: no path of this machine in the pictures
     app = CareApp(Request(Path(SAMPLE), top=10), settings=Settings(theme="textual-dark", places=(Path(),)))
     async with app.run_test(size=SIZE) as pilot:
-        screen = app.screen
-        assert isinstance(screen, WalkScreen)
-        for number, name in enumerate(STEPS, start=1):
-            while screen.is_busy:
-                await pilot.pause(0.05)
-            await pilot.press(str(number))
-            while screen.is_busy:
-                await pilot.pause(0.05)
-            await pilot.pause(0.2)
-            picture = folder / f"{number}-{name.lower()}.svg"
+        for number, page in enumerate(STEPS, start=1):
+            await _rest(pilot)
+            await pilot.press(page.keys)
+            await _rest(pilot)
+            picture = folder / f"{number}-{page.name}.svg"
             write_atomically(picture, app.export_screenshot(title=f"care {SAMPLE}", simplify=True))
             print(picture)
+
+
+async def _rest(pilot: Pilot[int]) -> None:
+    """Wait until every worker has answered, and what its answer asks for as well."""
+    for _ in range(3):
+        await pilot.pause(0.1)
+        await pilot.app.workers.wait_for_complete()
+    await pilot.pause(0.2)
 
 
 def photograph(folder: Path) -> None:

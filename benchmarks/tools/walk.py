@@ -42,17 +42,18 @@ WALK = (
         "Distribution",
         "The log is read, and the app stands at the first objective outside its threshold.",
     ),
-    Step(("1",), "took off", "What happened? Findings, had there been any, then the timeline of the flight."),
-    Step(("G", "p"), "(wanted)", "The plots, at the moment under the cursor: dotted what was wanted."),
-    Step(("2",), "Distribution", "A digit leaves the plots, back to the objectives."),
+    Step(("1",), "came down 10 m", "What happened? Findings first, then the timeline of the flight."),
+    Step(("p",), "60", "p shows the signal that proves what is under the cursor, at its moment, its time shaded."),
+    Step(("M",), "its corners", "The map: where it went, and the way that it was asked to go."),
+    Step(("2",), "Distribution", "A digit leaves the views, back to the objectives."),
     Step(
-        ("Enter",), "Confidence", "What caused it? The path from the option to the objective, with this run's values."
+        ("Enter",),
+        "height above home",
+        "What caused it? What this run shows comes first, with the signal that proves it; the path stands below.",
     ),
-    Step(
-        ("Enter",), "as driven", "What to change, and what that is predicted to bring. As driven, little speaks for it."
-    ),
-    Step(("=", "20", "Enter"), "16 → 20", "What if it were 20? The probability follows: that is not enough."),
-    Step(("u",), "as driven", "u takes it back."),
+    Step(("Enter",), "What to change", "What to change, and what that is predicted to bring."),
+    Step(("=", "20", "Enter"), "16 → 20", "What if it were 20? The odds follow: that is not enough."),
+    Step(("u",), "16 → 40", "u takes it back."),
     Step(("Enter",), "Commands that do it", "What would change in the configuration, and how to change it."),
     Step(("Enter",), "schema: care.triage", "The report as it will be written; f turns it into Markdown."),
     Step(("f",), "# Triage", "Markdown for the ticket."),

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, open_case
-from care_core.application.open_run import OpenRun, log_of
-from care_core.application.plotting import MOST_PLOTS, marks_in, meanings, ranked, segments
+from care_core.application.open_run import OpenRun
+from care_core.application.plotting import MOST_PLOTS, marks_in, ranked, segments
+from care_core.application.proof import meanings
 from care_core.application.sharing import EVERYTHING, Sharing
 from care_core.application.signals import Line as Values
 from care_core.application.signals import Signal, Source, lines_of, whole_of
@@ -78,7 +79,7 @@ class Compared(Record, eq=False):
         )
 
     def _plots(self, end_s: float) -> Iterator[Plot]:
-        text, meaning_of = self.sharing.text(self.b), meanings(log_of(self.b))
+        text, meaning_of = self.sharing.text(self.b), meanings(self.b)
         for place, (signal, one, other) in enumerate(self._pairs()):
             if place >= MOST_PLOTS + MOST_OTHERS:
                 return
@@ -114,7 +115,7 @@ class Compared(Record, eq=False):
         """Where signals go apart first."""
         from care_core.diagnose.comparison import Departure
 
-        text, meaning_of, found = self.sharing.text(self.b), meanings(log_of(self.b)), []
+        text, meaning_of, found = self.sharing.text(self.b), meanings(self.b), []
         pairs = [
             (*pair, meaning)
             for pair in self._pairs()

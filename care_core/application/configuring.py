@@ -175,19 +175,34 @@ def patch_of(files: Iterable[EditedFile]) -> str:
 def diff_of(case: Case, fix: Fix, side: DiffSide) -> str:
     """A unified diff: what was driven, or the operator's files, against the suggestion; or one against the other."""
     from care_core.configs.changes import unified_diff
-    from care_core.configs.driven import parameter_value, readable
-    from care_core.configs.edit import Wanted, apply_changes
 
     if side == "driven":
         return unified_diff(case.diagnosis.run, fix.changes)
     if side == "file":
-        wanted = [
-            Wanted(change.option, parameter, parameter_value(change.option, change.suggested))
-            for change in fix.changes
-            for parameter in readable(change.option)
-        ]
-        return patch_of(apply_changes([str(name) for name in case.configs], wanted))
+        return patch_of(edited_by(case, fix))
     return _file_against_driven(case)
+
+
+def edited_by(case: Case, fix: Fix) -> tuple[EditedFile, ...]:
+    """The operator's files with a fix put in; nothing is written. Raises ConfigError."""
+    from care_core.configs.driven import parameter_value, readable
+    from care_core.configs.edit import Wanted, apply_changes
+
+    wanted = [
+        Wanted(change.option, parameter, parameter_value(change.option, change.suggested))
+        for change in fix.changes
+        for parameter in readable(change.option)
+    ]
+    return apply_changes([str(name) for name in case.configs], wanted)
+
+
+def apply_to_files(case: Case, fix: Fix) -> list[tuple[Path, Path]]:
+    """Put a fix into the operator's files: comments stay, and each old file is kept beside. Answers the files with
+    where the old ones are. Raises ConfigError."""
+    from care_core.configs.writing import replace_with_backup
+
+    changed = [file for file in edited_by(case, fix) if file.edits]
+    return [(file.path, replace_with_backup(file)) for file in changed]
 
 
 def _file_against_driven(case: Case) -> str:

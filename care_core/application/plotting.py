@@ -6,12 +6,11 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from care_core.application.open_run import OpenRun, log_of
+from care_core.application.open_run import OpenRun
+from care_core.application.proof import finding_score, meanings
 from care_core.application.sharing import EVERYTHING, Sharing
 from care_core.application.signals import Line as Values
-from care_core.application.signals import Signal, Source, lines_of, signals_of, whole_of
-from care_core.ecosystems.dictionary import Field
-from care_core.ecosystems.registry import ecosystem_of
+from care_core.application.signals import Signal, Source, lines_of, settled_s, signals_of, whole_of
 from care_core.numbers import median
 from care_core.records import replace
 from care_core.report.marks import Mark, marks_of
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from care_core.ecosystems.findings import Finding
-    from care_core.logs.base import Log
 
 MOST_PLOTS, FEWEST, MOST_OTHERS = 8, 6, 10
 """Plots that matter at most and, with others, at least; and how many more."""
@@ -31,8 +29,6 @@ MOST_POINTS = 400
 MOST_MARKS = 16
 _SAME = 12
 """Letters that two marks of one second share where they say the same."""
-_POSITION = re.compile(r"position\.|(^|\.)(latitude|longitude|altitude)$")
-"""Fields of ROS messages that say where a robot was, of whatever type."""
 _LONGEST_GAP, _LEAST_GAP = 5.0, 0.01
 """A line is broken where it has no value for so many of its usual intervals, and for this share of the span."""
 
@@ -81,6 +77,7 @@ def drawn_of(case: OpenRun, sharing: Sharing = EVERYTHING) -> Drawing:
         deadlines=tuple(_deadlines(case, span)),
         start_s=span[0],
         end_s=span[1],
+        scale_end_s=settled_s(diagnosis),
     )
 
 
@@ -109,12 +106,15 @@ def ranked(case: OpenRun, sharing: Sharing = EVERYTHING) -> tuple[list[list[Sign
     matters = {result.variable.name for result in diagnosis.objectives if result.status == "fault"}
     matters |= {node.name for fault in diagnosis.faults for cause in fault.causes[:1] for node in cause.path}
     findings = [one for one in diagnosis.health.findings if one.severity != "info"]
-    named = [_channels(one) for one in (*findings, *(below for one in findings for below in one.below))]
+    findings += [below for one in findings for below in one.below]
+    meaning = meanings(case)
 
     def rank(group: Sequence[Signal]) -> tuple[float, float]:
-        found = next((place for place, names in enumerate(named) if group[0].channel in names), None)
-        if found is not None:
-            return 0.0, found
+        fields = [(one, meaning(one.channel, one.field)) for one in group]
+        for place, finding in enumerate(findings):
+            score = max(finding_score(finding, one, field) for one, field in fields)
+            if score >= 1:
+                return 0.0, place - score / 100
         used = {name for one in group for name in one.used_by}
         if used & matters:
             return 1.0, -len(used & matters) / len(used)
@@ -122,21 +122,9 @@ def ranked(case: OpenRun, sharing: Sharing = EVERYTHING) -> tuple[list[list[Sign
 
     groups = list(_groups(signals_of(case)))
     if not sharing.positions:
-        meaning = meanings(log_of(case))
         groups = [group for group in groups if not any(meaning(one.channel, one.field).is_position for one in group)]
     ordered = sorted(groups, key=rank)
     return ordered, sum(rank(group)[0] < 2 for group in ordered)
-
-
-def meanings(log: Log) -> Callable[[str, str], Field]:
-    """What a signal of a log means, by channel and field; what a dictionary lacks is judged by its name."""
-    ecosystem, channels = ecosystem_of(log.format), {channel.name: channel for channel in log.channels()}
-
-    def meaning(name: str, field: str) -> Field:
-        found = (ecosystem.field(channels[name], field) if name in channels else None) or Field()
-        return replace(found, is_position=found.is_position or _POSITION.search(field) is not None)
-
-    return meaning
 
 
 def _channels(finding: Finding) -> list[str]:
@@ -154,7 +142,7 @@ def _plot(
 ) -> Plot | None:
     """The plot of a group, None where the log has no number for it in the span."""
     channel = group[0].channel
-    meaning = meanings(log_of(case))(channel, group[0].field)
+    meaning = meanings(case)(channel, group[0].field)
     unit, words = meaning.unit, meaning.label
     lines, drawn = [], []
     for one in group:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from care_core.diagnose.records import Diagnosis
     from care_core.logs.base import Channel, Log, Table
 
 Source = tuple[str, str]
@@ -123,6 +125,7 @@ class Trace(Record):
     """Empty where nothing was wanted."""
     low: float
     high: float
+    """Between them lies what was measured until the robot was down; what is thrown about later runs along the edge."""
     count: int
 
 
@@ -210,6 +213,16 @@ def whole_of(case: OpenRun) -> tuple[float, float]:
     return 0.0, max(log_of(case).duration_s, 1e-9)
 
 
+def settled_s(diagnosis: Diagnosis) -> float:
+    """When the run was over, crashed or back on the ground: what is measured later tells nothing of it."""
+    from care_core.ecosystems.findings import every_finding
+
+    health = diagnosis.health
+    down = [one.onset_s for one in every_finding(health.findings) if one.kind == "crash"]
+    down += [one.time_s for one in health.timeline if one.kind == "crash" or one.text == "landed"]
+    return max(down) if down else math.inf
+
+
 def trace_of(case: OpenRun, signal: Signal, span: tuple[float, float], columns: int) -> Trace:
     """The signal, and what was wanted of it, over a span of the log in so many columns.
 
@@ -227,7 +240,10 @@ def trace_of(case: OpenRun, signal: Signal, span: tuple[float, float], columns: 
         raise CareError(f"{signal.name} has no value {where}.", hint="Choose another signal, or - for more of the log.")
     drawn = [line for line in lines if line is not None and len(line[1])]
     squeezed = [_squeezed(t, values, span, columns) for t, values in drawn]
-    low, high = min(float(v.min()) for _, v in drawn), max(float(v.max()) for _, v in drawn)
+    end_s = settled_s(case.diagnosis)
+    until = [values[t <= end_s] for t, values in drawn]
+    scale = [values for values in until if len(values)] or [values for _, values in drawn]
+    low, high = min(float(v.min()) for v in scale), max(float(v.max()) for v in scale)
     return Trace(*span, squeezed[0], squeezed[1] if len(squeezed) > 1 else (), low, high, count)
 
 

@@ -12,6 +12,7 @@ from care_core.files import read_small_text
 from care_core.records import Record
 
 if TYPE_CHECKING:
+    from care_core.diagnose.verdict import RunStatus
     from care_core.ecosystems.findings import Event
     from care_core.history.store import Triaged
     from care_core.run import FitVerdict
@@ -100,14 +101,42 @@ class Past(Record):
 
 def past_runs() -> list[Past]:
     """What the local history holds, the newest first. Raises CareError where it is switched off."""
+    return [_past(triaged) for triaged in _remembered()]
+
+
+def known_verdicts(written_s: Mapping[Path, float]) -> dict[Path, tuple[RunStatus, str]]:
+    """What the local history knows of logs: the verdict on each that was triaged since it was last written, and what
+    failed. Empty where there is no history to be used."""
+    from datetime import datetime
+
+    from care_core.report.document import remembered_verdict
+    from care_core.report.reading import remembered
+
+    try:
+        triages = _remembered()
+    except CareError:
+        return {}
+    known: dict[Path, tuple[RunStatus, str]] = {}
+    for triaged in triages:  # the newest first
+        path = Path(triaged.log_path)
+        if (
+            path in written_s
+            and path not in known
+            and datetime.fromisoformat(triaged.at).timestamp() >= written_s[path]
+        ):
+            verdict = remembered_verdict(remembered(triaged.document))
+            known[path] = verdict.status, verdict.failed
+    return known
+
+
+def _remembered() -> tuple[Triaged, ...]:
+    """The triages of the local history. Raises CareError where it is switched off."""
     from care_core.history.store import SWITCH, History, history_path
 
     path = history_path()
     if path is None:
         raise CareError("The history is switched off.", hint=f"Unset {SWITCH} to have runs remembered.")
-    if not path.is_file():
-        return []
-    return [_past(triaged) for triaged in History(path).triages()]
+    return History(path).triages() if path.is_file() else ()
 
 
 def _past(triaged: Triaged) -> Past:

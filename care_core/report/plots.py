@@ -11,8 +11,9 @@ from html import escape
 
 from care_core.diagnose.records import Fault
 from care_core.records import Record
+from care_core.report.axes import tick_time, time_ticks, value_ticks
 from care_core.report.marks import Mark
-from care_core.text import clean, figures, log_time
+from care_core.text import LONG_S, clean, figures, log_time
 
 Point = tuple[float, float]
 """Seconds of the log, and a value."""
@@ -25,26 +26,6 @@ _MARGIN = 0.06
 """Share of the values' span that is free above and below them."""
 _CLOSE = 0.045
 """Marks that are nearer, as a share of the width, share a sign."""
-_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
-_STEPS_OF_TIME = (
-    0.1,
-    0.2,
-    0.5,
-    1.0,
-    2.0,
-    5.0,
-    10.0,
-    15.0,
-    20.0,
-    30.0,
-    60.0,
-    120.0,
-    300.0,
-    600.0,
-    1200.0,
-    1800.0,
-    3600.0,
-)
 
 
 class Line(Record):
@@ -103,6 +84,8 @@ class Drawing(Record):
     """Limits of a time, in seconds of the log."""
     start_s: float = 0.0
     end_s: float = 1.0
+    scale_end_s: float = math.inf
+    """What comes later does not set the scale: what is down is thrown about."""
     since: str = "the start of the log"
     """What the seconds count from: that of the log, unless several runs are laid over each other."""
 
@@ -136,8 +119,8 @@ def plot_figure(plot: Plot, drawn: Drawing, name: str) -> Iterator[str]:
             yield f'<span class="limit{side}" style="top:{frame.y_share(limit.value):.1%}">{text}</span>'
     yield '</div><div class="x" aria-hidden="true">'
     for time_s in frame.times:
-        unit = " s" if time_s == frame.times[-1] else ""
-        yield f'<span style="left:{frame.x_share(time_s):.2%}">{time_s:g}{unit}</span>'
+        unit = " s" if time_s == frame.times[-1] < LONG_S else ""
+        yield f'<span style="left:{frame.x_share(time_s):.2%}">{tick_time(time_s)}{unit}</span>'
     yield "</div></div></figure>"
 
 
@@ -229,12 +212,13 @@ class _Frame(Record):
     low: float
     high: float
     times: tuple[float, ...]
-    """Ticks, in seconds of the log."""
+    """Ticks in seconds of the log."""
     values: tuple[float, ...]
 
     @classmethod
     def of(cls, plot: Plot, drawn: Drawing) -> _Frame:
-        values = [value for line in plot.lines for segment in line.segments for _, value in segment]
+        points = [point for line in plot.lines for segment in line.segments for point in segment]
+        values = [value for time_s, value in points if time_s <= drawn.scale_end_s] or [value for _, value in points]
         low, high = min(values), max(values)
         span = high - low or max(abs(high), 1.0)
         # A limit is drawn where it does not press the signal flat; else the signal kept it by far.
@@ -242,11 +226,8 @@ class _Frame(Record):
         low, high = min((low, *near)), max((high, *near))
         pad = (high - low) * _MARGIN or max(abs(high), 1.0) * 0.1
         low, high = low - pad, high + pad
-        seconds = drawn.end_s - drawn.start_s
-        step = next((step for step in _STEPS_OF_TIME if seconds / step <= _TICKS_X), _nice(seconds / _TICKS_X))
-        ticks = range(math.ceil(drawn.start_s / step), math.floor(drawn.end_s / step) + 1)
-        times = tuple(round(i * step, 6) for i in ticks)
-        return cls(drawn.start_s, drawn.end_s, low, high, times, _ticks(low, high))
+        times = time_ticks(drawn.start_s, drawn.end_s, _TICKS_X)
+        return cls(drawn.start_s, drawn.end_s, low, high, times, value_ticks(low, high, _TICKS_Y))
 
     def x_share(self, time_s: float) -> float:
         return min(max((time_s - self.start_s) / max(self.end_s - self.start_s, 1e-9), 0.0), 1.0)
@@ -258,7 +239,8 @@ class _Frame(Record):
         return self.x_share(time_s) * _WIDE
 
     def y(self, value: float) -> float:
-        return self.y_share(value) * _HIGH
+        """A place in the field; what is outside the scale runs along its edge."""
+        return min(max(self.y_share(value), 0.0), 1.0) * _HIGH
 
     def path(self, line: Line) -> str:
         """The line as path data; a single value between two gaps is a dash."""
@@ -267,18 +249,6 @@ class _Frame(Record):
             places = [f"{self.x(time_s):.1f} {self.y(value):.1f}" for time_s, value in segment]
             parts.append(f"M{'L'.join(places)}" if len(places) > 1 else f"M{places[0]}h2")
         return "".join(parts)
-
-
-def _ticks(low: float, high: float) -> tuple[float, ...]:
-    step = _nice((high - low) / _TICKS_Y)
-    first = math.ceil(low / step)
-    return tuple(float(f"{i * step:.12g}") for i in range(first, math.floor(high / step) + 1))
-
-
-def _nice(step: float) -> float:
-    """The next round number: 1, 2, 2.5 or 5 times a power of ten."""
-    power = float(10.0 ** math.floor(math.log10(step)))
-    return next(nice * power for nice in _STEPS if nice * power >= step * (1 - 1e-9))
 
 
 def _number(value: float) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from care_core.application.plotting import meanings, ranked
+from care_core.application.plotting import ranked
+from care_core.application.proof import meanings
 from care_core.application.signals import Source, lines_of, signals_of, whole_of
 from care_core.errors import UsageError, nearest
 from care_core.text import figures
@@ -20,7 +21,7 @@ def signal_list(case: Case) -> str:
     if case.log is None:
         return "The log holds no signals."
     groups, telling = ranked(case)
-    meaning_of = meanings(case.log)
+    meaning_of = meanings(case)
     start_s, end_s = whole_of(case)
     lines = [f"the mission is from {figures(start_s, 5)} to {figures(end_s, 5)} s of the log"]
     for place, group in enumerate(groups):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.application import api
-from care_core.errors import ConfigError, ExitCode, UsageError
+from care_core.errors import ExitCode, UsageError
 from care_core.text import clean
 from care_tui import __version__
 from care_tui.commands.arguments import AsJson, Force, Out, is_json, profile_option
@@ -142,23 +141,14 @@ def _write_or_print(text: str, out: Path | None, *, force: bool) -> None:
 
 
 def _replace(file: EditedFile) -> None:
-    from care_core.files import write_atomically
+    from care_core.configs.writing import replace_with_backup
 
-    backup = next(path for path in _backups(file.path) if not os.path.lexists(path))
-    write_atomically(backup, file.before, file.path.stat().st_mode & 0o777)
-    _write_checked(file, file.path)
+    backup = replace_with_backup(file)
     say(f"wrote {file.path}, the old one is {backup}")
 
 
-def _backups(path: Path) -> Iterator[Path]:
-    yield path.with_name(f"{path.name}.bak")
-    number = 1
-    while True:
-        yield path.with_name(f"{path.name}.bak{number}")
-        number += 1
-
-
 def _write_to(out: Path, edited: Sequence[EditedFile], *, force: bool) -> None:
+    from care_core.configs.writing import write_checked
     from care_core.outputs import check_replaceable
 
     targets = [out / file.path.name if len(edited) > 1 or out.is_dir() else out for file in edited]
@@ -170,25 +160,5 @@ def _write_to(out: Path, edited: Sequence[EditedFile], *, force: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
     for target, file in zip(targets, edited, strict=True):
         check_replaceable(target, file.after.encode(), force=force)
-        _write_checked(file, target)
+        write_checked(file, target)
         say(f"wrote {target}")
-
-
-def _write_checked(file: EditedFile, target: Path) -> None:
-    """Write an edited file and read it again; where it does not hold the changes, what was there before is put back."""
-    from care_core.configs.edit import check_written
-    from care_core.files import read_small_bytes, replace_file, write_atomically
-
-    mode = file.path.stat().st_mode & 0o777
-    before = read_small_bytes(target) if target.is_file() else None
-    write_atomically(target, file.after, mode)
-    if not target.is_file():  # a pipe, which says nothing of what it took
-        return
-    try:
-        check_written(file, target)
-    except ConfigError:
-        if before is None:
-            target.unlink()
-        else:
-            replace_file(target, before, mode)
-        raise

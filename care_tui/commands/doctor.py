@@ -46,7 +46,7 @@ def doctor(json: AsJson = False) -> None:
 
 def _terminal() -> Iterator[Checked]:
     from care_core.application.checkup import Checked
-    from care_tui.screens.base import MIN_HEIGHT, MIN_WIDTH
+    from care_tui.screens.case import MIN_HEIGHT, MIN_WIDTH
     from care_tui.settings import takes_only_ascii
 
     term = os.environ.get("TERM", "")

@@ -25,7 +25,7 @@ from care_tui.commands.arguments import (
     bounds,
 )
 from care_tui.console import say
-from care_tui.places import files_of, logs_in, written_s
+from care_tui.places import files_of, is_openable, logs_in, written_s
 
 app = typer.Typer()
 
@@ -58,7 +58,7 @@ def open_app(
     ascii = ascii or takes_only_ascii(sys.stderr.encoding, os.environ.get("TERM", ""))
     chosen = with_flags(load_settings(settings), ascii=ascii, mouse=not no_mouse, color=color, theme=theme)
     path = log or newest_log(chosen.places)
-    if path is not None:
+    if path is not None and not (path.is_dir() and not is_openable(path)):
         sniff(path)
     # Textual draws on stderr. In a browser ('care serve') there is no terminal, but a driver of its own.
     is_terminal = all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr))
@@ -66,7 +66,7 @@ def open_app(
         raise UsageError("The terminal app needs a terminal.", hint="Use 'care triage LOG' here.")
     prepare_terminal(chosen)
     from care_tui.app import run
-    from care_tui.jobs import CAUSES
+    from care_tui.engine import CAUSES
 
     request = None
     if path is not None:

@@ -154,6 +154,7 @@ class _Screen(Struct, eq=False, dict=True):
     entries: list[WatchEntry] = field(default_factory=list)
     _held: list[str] = field(default_factory=list)
     _app: subprocess.Popen[bytes] | None = None
+    _folder: Path | None = None
     _status: str = ""
 
     @cached_property
@@ -165,9 +166,10 @@ class _Screen(Struct, eq=False, dict=True):
         return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
     def begin(self, folders: Sequence[Path]) -> None:
+        self._folder = folders[0]
         say(f"watching {', '.join(map(str, folders))}")
         if self._listens:
-            say("Number and Enter opens that log in the app, Enter the last one; Ctrl+C ends.")
+            say("Number and Enter opens that log in the app, Enter the last one, l and Enter lists all; Ctrl+C ends.")
 
     def show(self, entry: WatchEntry) -> None:
         from care_core.report.watching import entry_json, entry_line
@@ -249,6 +251,9 @@ class _Screen(Struct, eq=False, dict=True):
             return
         self._status = ""  # Enter has moved on to a line of its own
         wanted = line.strip()
+        if wanted == "l" and self._folder is not None:  # those of earlier days, too
+            self._app = subprocess.Popen(own_command(str(self._folder), *self.words))
+            return
         chosen = [entry for entry in self.entries if not wanted or str(entry.number) == wanted.removeprefix("#")]
         if not chosen:
             say(f"there is no log {wanted} yet" if self.entries else "there is no log yet")

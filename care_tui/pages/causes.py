@@ -1,22 +1,42 @@
-"""Step 3: what moved the objective the wrong way in this run, and along which path."""
+"""Step 3: what explains the fault, with what of this run shows it."""
 
 from __future__ import annotations
 
 from typing import ClassVar, NamedTuple
 
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container
 from textual.content import Content
 
+from care_core.application.proof import Subject
 from care_core.diagnose.records import Cause, Fault, Hypothesis
 from care_core.ecosystems.findings import Finding, every_finding
 from care_core.text import clean
 from care_core.variables import Variable
-from care_tui.pages.page import View
-from care_tui.pages.step import DiagnosisPage
-from care_tui.render.causes import cause_detail, cause_item, no_cause_rows
-from care_tui.render.health import hypothesis_item, hypothesis_rows
-from care_tui.render.rows import Rows
+from care_tui.messages import Decided
+from care_tui.pages.diagnosis import DiagnosisPage
+from care_tui.pages.page import View, enter_to
+from care_tui.pages.proofs import proof_rows
+from care_tui.render.causes import (
+    cause_item,
+    doubt_rows,
+    evidence_rows,
+    hypothesis_item,
+    no_cause_rows,
+    path_rows,
+    statistics_rows,
+    worth_rows,
+)
+from care_tui.render.health import hypothesis_rows
+from care_tui.render.rows import Row, Rows, folded, heading, labelled
 from care_tui.screens.prompt import Prompt
-from care_tui.widgets.choices import Listing
+from care_tui.widgets.choices import Choices, Listing
+from care_tui.widgets.reader import Reader
+
+FIGURE, LEAST_FIGURE = 14, 6
+"""Lines of the plot at most, and at least."""
 
 
 class Explanation(NamedTuple):
@@ -25,41 +45,72 @@ class Explanation(NamedTuple):
     cause: Cause | None
     hypothesis: Hypothesis | None
 
+    @property
+    def name(self) -> str:
+        return self.cause.option.name if self.cause else self.hypothesis.name if self.hypothesis else ""
+
 
 class CausesPage(DiagnosisPage):
-    name = "Causes"
+    NAME = "causes"
     NOTHING = "no cause is named"
+    FITS = True
     HELP = (
-        "Options that moved the objective the wrong way in this run, best first, with the causal path of the one under "
-        "the cursor. Enter goes to the fix. d sets a cause aside with a reason that goes into the report, and undoes "
-        "that. o turns to the next fault."
+        "What explains the fault, the likeliest first, with what this run shows of it, and the path that led to the "
+        "fault. p opens the proof as a plot, z the statistics behind it. d sets a cause aside with a reason that "
+        "goes into the report, the others are weighed anew, and d takes it back. o turns to the next fault. Enter goes "
+        "to the fix."
     )
-    ENTER = "Fix"
-    ACTIONS: ClassVar[frozenset[str]] = frozenset({"dismiss", "next_fault"})
+    BINDINGS: ClassVar[list[BindingType]] = [
+        enter_to("Fix"),
+        Binding("p", "prove", "Proof", id="causes.proof"),
+        Binding("d", "dismiss", "Set aside", id="causes.dismiss"),
+        Binding("z", "fold", "Statistics", id="causes.statistics"),
+        Binding("o", "next_fault", "Next fault", id="causes.next-fault"),
+    ]
+    _is_open = False
+    _wanted: str | None = None
+    """The cause that the cursor follows to its new place."""
+
+    def compose(self) -> ComposeResult:
+        with Container(id="left"):
+            yield Choices(self.glyphs.more, id="list")
+            side = Reader(id="side")
+            side.border_title = "Path and fix"
+            yield side
+        yield Reader(id="text")
 
     def view_of_diagnosis(self) -> View:
         ranked = self.ranked()
-        listing = Listing(len(ranked), lambda i, _width: self._item(ranked[i]), lambda i: _words(ranked[i]), height=2)
-        return View(self._title(), self._detail, listing)
+        listing = Listing(len(ranked), lambda i, width: self._item(ranked[i], width), lambda i: f"{ranked[i].name}")
+        names, wanted, self._wanted = [one.name for one in ranked], self._wanted, None
+        index = names.index(wanted) if wanted in names else None
+        return View(self._title(), self._detail, listing, index, about="What shows it, and how it led to the fault")
 
     def ranked(self) -> list[Explanation]:
-        """Parts, parameters, what was met and chance in one ranking, then the causes that it does not name."""
-        causes = {cause.option.name: cause for cause in self.session.causes}
-        if self.session.fault is None and self._has_causes:
+        """Parts, parameters, what was met and chance in one ranking, then the causes that it does not name, and those
+        that were set aside."""
+        session = self.session
+        causes = {cause.option.name: cause for cause in session.causes}
+        if session.fault is None and self._has_causes:
             return []  # of an objective that was kept
         found = [
             Explanation(causes.pop(one.name, None) if one.what == "parameter" else None, one)
-            for one in self.session.diagnosis.hypotheses
+            for one in session.hypotheses()
         ]
-        return found + [Explanation(cause, None) for cause in causes.values()]
+        left = [Explanation(cause, None) for cause in causes.values()]
+        return found + sorted(left, key=lambda one: one.name in session.dismissed)
 
-    def _item(self, one: Explanation) -> tuple[Content, Content]:
+    def _item(self, one: Explanation, width: int) -> tuple[Content]:
         if one.cause is None:
             assert one.hypothesis is not None
-            return hypothesis_item(one.hypothesis, self._finding(one.hypothesis), self.session.diagnosis.outside)
+            return (
+                hypothesis_item(
+                    one.hypothesis, self._finding(one.hypothesis), self.session.diagnosis.outside, self.glyphs
+                ),
+            )
         aside = self.session.dismissed.get(one.cause.option.name)
         share = None if one.hypothesis is None else one.hypothesis.probability
-        return cause_item(one.cause, share, aside, self.glyphs, self.session.diagnosis.odds_as_driven)
+        return (cause_item(one.cause, share, aside, self.glyphs, width),)
 
     def _finding(self, hypothesis: Hypothesis) -> Finding | None:
         """The finding that an explanation is named after."""
@@ -70,21 +121,35 @@ class CausesPage(DiagnosisPage):
     def _has_causes(self) -> bool:
         return any(fault.causes for fault in self.session.diagnosis.faults)
 
-    def works(self, action: str) -> bool:
-        return super().works(action) and (action != "dismiss" or bool(self.session.causes))
-
-    def option_here(self) -> Variable | None:
-        name = self.option_at(self.screen.choices.highlighted)
-        return next((option for option in self.session.options() if option.name == name), None) if name else None
-
-    def option_at(self, index: int | None) -> str | None:
-        """The option of the cause at this place, None where there is none."""
-        cause = None if index is None else self.ranked()[index].cause
-        return None if cause is None else cause.option.name
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        if action == "dismiss" and self.has_content and not self.session.causes:
+            return False
+        if action == "next_fault" and self.has_content:
+            return len(self.session.diagnosis.faults) > 1
+        return super().check_action(action, parameters)
 
     @property
-    def _is_empty(self) -> bool:
-        return super()._is_empty and not self.session.diagnosis.hypotheses
+    def _here(self) -> Explanation | None:
+        """The explanation under the cursor."""
+        if self.index is None or not self.has_content:
+            return None
+        ranked = self.ranked()
+        return ranked[self.index] if self.index < len(ranked) else None
+
+    def option_here(self) -> Variable | None:
+        name = self.option_name()
+        return next((option for option in self.session.options() if option.name == name), None) if name else None
+
+    def option_name(self) -> str | None:
+        """The option of the cause under the cursor, None where there is none."""
+        here = self._here
+        return here.cause.option.name if here and here.cause else None
+
+    def subject(self) -> Subject | None:
+        here = self._here
+        if here is None:
+            return None
+        return here.cause or (self._finding(here.hypothesis) if here.hypothesis else None)
 
     def _title(self) -> Content:
         result, faults, fault = self.session.result, self.session.diagnosis.faults, self.session.fault
@@ -94,12 +159,12 @@ class CausesPage(DiagnosisPage):
             return Content("What explains it" + (f"; {why}, so no parameter is judged" if why else ""))
         if result is None:
             return Content("No objective")
-        title = Content.assemble("Causes of ", (clean(result.variable.name), "bold"), self._alike(fault))
+        title = Content(f"Causes of {clean(result.variable.name)}{self._alike(fault)}")
         if fault is not None and fault.causes and all(cause.is_lead for cause in fault.causes):
             title += Content(f": none found, {len(fault.causes)} not ruled out")
         if fault is None or len(faults) < 2:
             return title
-        return title + Content.styled(f"  ({faults.index(fault) + 1} of {len(faults)} faults, o: next)", "dim")
+        return title + Content(f" ({faults.index(fault) + 1} of {len(faults)} faults, o: next)")
 
     def _alike(self, fault: Fault | None) -> str:
         """The other faults with the same causes, as the report puts them together."""
@@ -113,54 +178,127 @@ class CausesPage(DiagnosisPage):
         others = [one for group in groups if fault in group for one in group if one is not fault]
         return "".join(f" and {clean(one.objective.variable.name)}" for one in others)
 
+    # The text: what shows it first, then the path and what a change brings, then statistics
+
     def _detail(self, index: int | None) -> Rows:
         session, result = self.session, self.session.result
-        if index is None or session.case is None:
+        ranked = self.ranked() if session.case is not None else []
+        if index is None or index >= len(ranked):
             return no_cause_rows(session.diagnosis, result)
-        cause, hypothesis = self.ranked()[index]
+        cause, hypothesis = ranked[index]
         if cause is None or result is None:
             assert hypothesis is not None
-            diagnosis = session.diagnosis
-            told = [*diagnosis.notes, *(one.text for one in diagnosis.outside)]
-            return Rows(hypothesis_rows(hypothesis, self._finding(hypothesis), told))
-        model = session.case.model
+            return self._of_hypothesis(hypothesis)
+        diagnosis = session.diagnosis
+        doubt = doubt_rows(diagnosis)
+        shown = evidence_rows(cause, diagnosis, session.dismissed)
+        rows = [*(doubt if cause.is_lead else ()), *shown]
+        rows += self._figure(cause.option.name, cause, len(Rows(rows).wrap(self.reader.room.width)))
+        side = self._of_cause(cause)
+        return Rows(rows if self._is_wide else [*rows, *side])
+
+    def _of_cause(self, cause: Cause) -> list[Row]:
+        """The path of a cause, what its change brings, and the statistics, folded."""
+        session, result = self.session, self.session.result
+        assert result is not None
+        model = session.case.model if session.case else None
         effect = model.effects.get((cause.option.name, result.variable.name)) if model else None
-        return cause_detail(cause, session.causes, result, effect, session.diagnosis, session.dismissed, self.glyphs)
+        rows = [heading("Path"), *path_rows(cause, result, self.glyphs), Row(Content())]
+        rows += worth_rows(cause, result, session.odds_unchanged(), self.glyphs)
+        doubt = [] if cause.is_lead else doubt_rows(session.diagnosis)
+        statistics = statistics_rows(cause, session.causes, effect, self.glyphs)
+        return [*rows, *doubt, *folded("Statistics", statistics, self.glyphs, is_open=self._is_open)]
 
-    def open(self, index: int | None) -> None:
-        one = None if index is None else self.ranked()[index].hypothesis
-        self.session.option = one.name if one is not None and one.what == "parameter" else self.option_at(index)
-        self.walk.action_go(4)
+    def _of_hypothesis(self, hypothesis: Hypothesis) -> Rows:
+        diagnosis, finding = self.session.diagnosis, self._finding(hypothesis)
+        told = [*diagnosis.notes, *(one.text for one in diagnosis.outside)]
+        rows = hypothesis_rows(hypothesis, finding, told)
+        if finding is None:
+            return Rows(rows)
+        first = [labelled("Seen by", finding.evidence)] if finding.evidence else []
+        figure = self._figure(finding.title, finding, len(Rows(first).wrap(self.reader.room.width)))
+        return Rows([*first, *figure, *(() if self._is_wide else rows)])
 
-    def next_fault(self) -> None:
+    def _figure(self, name: str, subject: Subject, above: int) -> list[Row]:
+        """The proof as a plot in what room is left."""
+        room = self.reader.room
+        height = min(max(room.height - above, LEAST_FIGURE), FIGURE if not self._is_wide else 2 * FIGURE)
+        return proof_rows(self, name, subject, room.width, height)
+
+    @property
+    def _is_wide(self) -> bool:
+        """Whether cause, proof and fix stand together."""
+        return self.screen.has_class("-wide") or self.screen.has_class("-widest")
+
+    def show_text(self, *, from_top: bool = True) -> None:
+        super().show_text(from_top=from_top)
+        self._show_side()
+
+    def show(self, index: int | None = None) -> None:
+        super().show(index)
+        self._show_side()
+
+    def _show_side(self) -> None:
+        side, here = self.query_one("#side", Reader), self._here
+        rows = self._beside(here) if here is not None and self._is_wide else []
+        side.display = bool(rows)
+        if rows:
+            side.show(Rows(rows))
+
+    def _beside(self, here: Explanation) -> list[Row]:
+        """What stands beside the proof: the path of a cause and what its change brings, or all about a finding."""
+        if here.cause is not None and self.session.result is not None:
+            return self._of_cause(here.cause)
+        finding = here.hypothesis and self._finding(here.hypothesis)
+        return hypothesis_rows(here.hypothesis, finding) if here.hypothesis and finding else []
+
+    @on(Reader.Fitted, "#side")
+    def _side_fits(self, event: Reader.Fitted) -> None:
+        event.stop()
+
+    # What the keys do
+
+    def action_open(self) -> None:
+        """Go to the fix, with the cursor on this parameter."""
+        here = self._here
+        is_parameter = here is not None and (here.cause or (here.hypothesis and here.hypothesis.what == "parameter"))
+        self.session.option = here.name if here is not None and is_parameter else None
+        self.go_on()
+
+    def action_prove(self) -> None:
+        """Show the signal that proves the cause under the cursor."""
+        self.go("plots", None, self.subject())
+
+    def action_fold(self) -> None:
+        """Open or close the statistics."""
+        self._is_open = not self._is_open
+        self.show_text(from_top=False)
+
+    def action_next_fault(self) -> None:
         """Turn to the causes of the next faulty objective."""
-        if self.session.state == "data" and self.session.next_fault():
-            self.screen.draw(index=0)
+        if self.session.next_fault():
+            self.show(0)
+            self.refresh_bindings()
 
-    def dismiss(self) -> None:
+    def action_dismiss(self) -> None:
         """Set the cause under the cursor aside, or take it back."""
-        option = self.option_at(self.screen.choices.highlighted)
+        option = self.option_name()
         if option is None:
             return
         if option in self.session.dismissed:
-            self._redraw(self.session.take_back(option), f"{option} is back in the fix.")
+            self._wanted = option
+            self._decided(self.session.take_back(option), f"{option} is back in the fix.")
             return
         prompt = Prompt(f"Set {option} aside", hint="Why? It goes into the report. Enter keeps it, Esc cancels.")
-        self.screen.app.push_screen(prompt, lambda reason: self._dismissed(option, reason))
+        self.app.push_screen(prompt, lambda reason: self._dismissed(option, reason))
 
     def _dismissed(self, option: str, reason: str | None) -> None:
         if reason:
-            self._redraw(self.session.set_aside(option, reason), f"{option} was also taken out of the fix.")
+            self._wanted = option
+            changed = self.session.set_aside(option, reason)
+            self._decided(changed, f"{option} was also taken out of the fix.")
 
-    def _redraw(self, has_changed_fix: bool, words: str) -> None:
+    def _decided(self, has_changed_fix: bool, words: str) -> None:
         if has_changed_fix:
-            self.walk.basket_changed()
-            self.screen.say(words)
-        else:
-            self.screen.draw()
-
-
-def _words(one: Explanation) -> str:
-    """What `/` searches in."""
-    named = "" if one.hypothesis is None else f"{one.hypothesis.what} {one.hypothesis.name}"
-    return named if one.cause is None else f"{one.cause.option.name} {named}"
+            self.say(words)
+        self.post_message(Decided(has_changed_fix))

@@ -1,89 +1,152 @@
-"""Step 5: what would change in the configuration, line by line."""
+"""Step 5: what would change in the configuration, line by line, and the change put into the operator's file."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import ClassVar
 
+from textual.binding import Binding, BindingType
 from textual.content import Content
 
 from care_core.application.configuring import DiffSide
 from care_core.errors import CareError
-from care_tui.pages.page import View, sentence
-from care_tui.pages.step import DiagnosisPage
+from care_core.records import replace
+from care_core.text import clean
+from care_tui.copying import copy
+from care_tui.pages.diagnosis import DiagnosisPage
+from care_tui.pages.page import View, enter_to, sentence
+from care_tui.places import as_path
 from care_tui.render.fix import no_fix_rows
 from care_tui.render.rows import Rows, command_rows, diff_rows, error_rows
+from care_tui.screens.confirm import Confirm
+from care_tui.screens.prompt import Prompt
 
 SIDES: dict[DiffSide, str] = {
     "driven": "As driven (-) against suggested (+)",
     "file": "Your file (-) against suggested (+)",
     "changed": "As driven (-) against your file (+)",
 }
+DIFF, APPLY = "diff", "apply"
+
+
+def _not_a_file(typed: str) -> str:
+    """What is wrong with the name of a configuration file; empty where nothing is."""
+    path = as_path(typed.rpartition("=")[2])
+    return "" if path.is_file() else "There is no such file."
 
 
 class DiffPage(DiagnosisPage):
-    name = "Diff"
+    NAME = "diff"
     NOTHING = "nothing is to be changed"
-    NEEDS_MISSION = True
     HELP = (
-        "Lines with - are what is, lines with + what is suggested. f compares with the file given by --config instead. "
-        "c copies the diff. Enter goes to the report. Nothing is written to the robot."
+        "Lines with - are what is, lines with + what is suggested. f compares with your own file, which it asks for; A "
+        "puts the change into that file: comments stay, the old one is kept beside. c copies the diff. Enter goes to "
+        "the report. Nothing is written to the robot."
     )
-    ENTER = "Report"
-    ACTIONS: ClassVar[frozenset[str]] = frozenset({"other_side", "copy_diff"})
+    BINDINGS: ClassVar[list[BindingType]] = [
+        enter_to("Report"),
+        Binding("f", "other_side", "My file", id="diff.side"),
+        Binding("A", "apply", "Apply to it", id="diff.apply"),
+        Binding("c", "copy_diff", "Copy", id="diff.copy"),
+    ]
     side: DiffSide = "driven"
 
     def enter(self) -> None:
-        if self.session.state == "data":
-            self._text: str | CareError | None = None
-            self._commands: list[str] = []
-            fix, case, side = self.session.fix, self.session.case, self.side
-            if case is not None and fix is not None and (fix.changes or side == "changed"):
-                engine, decided = self.walk.engine, self.session.decided()
-                commands = engine.commands if side == "driven" else lambda _diagnosis: []
-                self.screen.fetch(
-                    "diff", lambda _job: (engine.diff(case, fix, side), commands(decided)), self._received
-                )
-
-    def _received(self, answer: tuple[str, list[str]] | CareError) -> None:
-        self._text, self._commands = (answer, []) if isinstance(answer, CareError) else answer
-        if self.is_shown:
-            self.screen.draw()
+        self.forget(DIFF)
+        case, fix, side = self.session.case, self.session.fix, self.side
+        if case is None or fix is None or not (fix.changes or side == "changed") or not self.has_content:
+            return
+        if self.session.only_asked:
+            return
+        engine, decided = self.workspace.engine, self.session.decided()
+        commands = engine.commands if side == "driven" else lambda _diagnosis: []
+        self.fetched(DIFF, lambda: (engine.diff(case, fix, side), commands(decided)))
 
     def view_of_diagnosis(self) -> View:
-        session, text = self.session, self._text
-        title = Content("Nothing changes" if text is None and not session.basket.ticked else SIDES[self.side])
-        if isinstance(text, CareError):
-            return View(title, lambda _: error_rows(text))
-        if text is not None:
-            shown = text or "No difference.\n"
-            return View(title, lambda _: Rows([*diff_rows(shown).rows, *command_rows(self._commands)]))
+        session, answer = self.session, self._answers.get(DIFF)
+        title = Content(SIDES[self.side])
+        if isinstance(answer, CareError):
+            return View(title, lambda _: error_rows(answer))
+        if isinstance(answer, tuple):
+            diff, commands = answer
+            return View(title, lambda _: Rows([*diff_rows(diff or "No difference.\n").rows, *command_rows(commands)]))
+        if session.only_asked:
+            return View(Content("Nothing is advised"), lambda _: sentence(session.only_asked))
         if session.basket.ticked and session.fix_error is not None:
             error = session.fix_error
             return View(title, lambda _: error_rows(error))
         if session.basket.ticked:
             return View(title, lambda _: sentence("Computing..."))
+        title = Content("Nothing changes")
         if session.diagnosis.fix is None:
             return View(title, lambda _: no_fix_rows(session.diagnosis))
         return View(title, lambda _: sentence("No change is ticked in the fix (4)."))
 
-    def other_side(self) -> None:
-        """Compare with the file on disk, or with what was driven."""
-        if self.session.state != "data":
-            return
-        if not self.session.case or not self.session.case.configs:
-            self.screen.say("Start care with --config FILE to compare with the file on disk.")
+    @property
+    def _text(self) -> str:
+        answer = self._answers.get(DIFF)
+        return answer[0] if isinstance(answer, tuple) else ""
+
+    def action_other_side(self) -> None:
+        """Compare with the operator's file, which is asked for, or with what was driven."""
+        case = self.session.case
+        if case is None or not case.configs:
+            self._ask_for_file()
             return
         sides = list(SIDES)
-        self.side = sides[(sides.index(self.side) + 1) % len(sides)]
+        self._turn(sides[(sides.index(self.side) + 1) % len(sides)])
+
+    def _turn(self, side: DiffSide) -> None:
+        self.side = side
         self.enter()
-        self.screen.draw()
+        self.show()
 
-    def copy_diff(self) -> None:
-        """Copy the diff to the operator's clipboard."""
-        if self.session.state == "data" and isinstance(self._text, str) and self._text:
-            self.walk.copy(self._text, "the diff", ".patch")
+    def _ask_for_file(self) -> None:
+        hint = "The robot's configuration, for ROS also NAMESPACE=FILE. Enter takes it, Esc cancels."
+        self.app.push_screen(Prompt("Compare with the file", f"{Path().absolute()}/", hint, _not_a_file), self._named)
+
+    def _named(self, typed: str | None) -> None:
+        if typed is None or self.session.case is None:
+            return
+        namespace, sign, path = typed.rpartition("=")
+        name = f"{namespace}{sign}{as_path(path)}"
+        self.session.case = replace(self.session.case, configs=(name,))
+        if self.workspace.request is not None:
+            self.workspace.request = replace(self.workspace.request, configs=(name,))
+        self._turn("file")
+
+    def action_apply(self) -> None:
+        """Put the change into the operator's file, once that is confirmed; the old one is kept beside."""
+        case, fix = self.session.case, self.session.fix
+        if case is None or fix is None or not fix.changes or self.session.only_asked:
+            self.say(self.session.only_asked or "No change is ticked in the fix (4).")
+        elif not case.configs:
+            self._ask_for_file()
         else:
-            self.screen.say("There is no diff to copy.")
+            files = ", ".join(str(name) for name in case.configs)
+            question = f"Put {len(fix.changes)} change{'s' if len(fix.changes) > 1 else ''} into {files}?"
+            self.app.push_screen(
+                Confirm(question, "y writes it and keeps the old one as .bak, n or Esc leaves it"), self._confirmed
+            )
 
-    def open(self, index: int | None) -> None:
-        self.walk.action_go(6)
+    def _confirmed(self, answer: bool | None) -> None:
+        case, fix = self.session.case, self.session.fix
+        if answer and case is not None and fix is not None:
+            self.ask(APPLY, lambda: self.workspace.engine.apply(case, fix))
+
+    def take(self, question: str, answer: object) -> None:
+        if question != APPLY:
+            super().take(question, answer)
+        elif isinstance(answer, CareError):
+            self.say(str(answer))
+        elif isinstance(answer, list):
+            told = "; ".join(f"wrote {clean(str(file))}, the old one is {backup.name}" for file, backup in answer)
+            self.say(told or "The file holds these values already.")
+            self._turn("file")
+
+    def action_copy_diff(self) -> None:
+        """Copy the diff to the operator's clipboard."""
+        if self._text:
+            self.say(copy(self.app, self._text, "the diff", ".patch"))
+        else:
+            self.say("There is no diff to copy.")

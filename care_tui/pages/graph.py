@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+from textual.binding import Binding, BindingType
 from textual.content import Content
 
 from care_core.application.case import Case
+from care_core.application.proof import Subject
+from care_core.diagnose.records import Cause, ObjectiveResult
 from care_core.records import Record
 from care_core.run import is_known
 from care_core.text import figures
-from care_tui.pages.page import Page, View, sentence
-from care_tui.render.rows import Row, Rows, heading, labelled, measure, padded, percent, warning
-from care_tui.screens.panes import PanesScreen
+from care_tui.pages.page import Page, View, enter_to, sentence
+from care_tui.render.rows import FEW_RESAMPLES, Row, Rows, heading, labelled, measure, padded, percent, warning
 from care_tui.widgets.choices import Listing
+from care_tui.workspace import Workspace
 
 if TYPE_CHECKING:  # reading models is not needed for the first frame
     from care_core.causal.model import EdgeRecord
 
-FEW = 0.5
-"""Edges that fewer bootstrap resamples hold are flagged."""
 NARROW = 66
 """Cells that the words of a neighbour need."""
 
@@ -34,18 +35,29 @@ class Link(Record):
 
 
 class GraphPage(Page):
-    name = "Graph"
     HELP = (
         "The causal model around one variable, with the effect of every edge and how many resamples hold it. Enter "
         "goes to the neighbour under the cursor, h goes back, Esc leaves."
     )
-    ENTER = "Go there"
-    ACTIONS: ClassVar[frozenset[str]] = frozenset({"step_back"})
+    BINDINGS: ClassVar[list[BindingType]] = [
+        enter_to("Go there"),
+        Binding("left,h,backspace", "step_back", "Back a step", key_display="h", id="graph.back"),
+    ]
 
-    def __init__(self, screen: PanesScreen, case: Case, node: str | None) -> None:
-        super().__init__(screen)
-        self._case = case
-        self._trail = [node] if node and case.model and node in case.model.graph.nodes else []
+    def __init__(self, workspace: Workspace, *, id: str | None = None) -> None:
+        super().__init__(workspace, id=id)
+        case = workspace.session.case
+        assert case is not None
+        self._case: Case = case
+        self._trail: list[str] = []
+
+    def look_at(self, moment_s: float | None, subject: Subject | None) -> None:
+        """Start at the cause or the objective that the operator looks at."""
+        result = self.session.result
+        option = subject.option.name if isinstance(subject, Cause) else None
+        objective = subject.name if isinstance(subject, ObjectiveResult) else result.name if result else None
+        node, model = option or objective, self._case.model
+        self._trail = [node] if node and model and node in model.graph.nodes else []
 
     def view(self) -> View:
         if self._case.model is None or not self._trail:
@@ -53,7 +65,7 @@ class GraphPage(Page):
             why = "The profile has no model of this." if fits else "No profile fits this log: there is no model of it."
             return View(Content("Causal model"), lambda _: sentence(why))
         node, links = self._trail[-1], self._links(self._trail[-1])
-        title = Content.assemble("Around ", (node, "bold"), f"  {self._counts(links)}", ("  effects in sd", "dim"))
+        title = Content(f"Around {node}: {self._counts(links)}; effects in standard deviations")
         listing = Listing(len(links), lambda i, width: (self._item(links[i], width),), lambda i: links[i].name)
         return View(title, lambda i: self._detail(node, None if i is None else links[i]), listing)
 
@@ -83,7 +95,7 @@ class GraphPage(Page):
         held = (
             "" if link.support is None else f"in {percent(link.support):>5}{' of resamples' if width > NARROW else ''}"
         )
-        few = "  ! few" if link.support is not None and link.support < FEW else ""
+        few = "  ! few" if link.support is not None and link.support < FEW_RESAMPLES else ""
         return Content.assemble(f"{sign:<7} ", padded(link.name, 24, "bold"), f" {effect:>6}  {held}{few}")
 
     def _detail(self, node: str, link: Link | None) -> Rows:
@@ -114,16 +126,18 @@ class GraphPage(Page):
             rows.append(labelled("Training", span))
         return rows
 
-    def open(self, index: int | None) -> None:
-        if index is not None:
-            self._trail.append(self._links(self._trail[-1])[index].name)
-            self.screen.turn_to_page()
+    def action_open(self) -> None:
+        """Go to the neighbour under the cursor."""
+        if self.index is not None and self._trail:
+            self._trail.append(self._links(self._trail[-1])[self.index].name)
+            self.choices.filter("")
+            self.show(0)
 
-    def step_back(self) -> None:
+    def action_step_back(self) -> None:
         """Go back to the variable before."""
         if len(self._trail) > 1:
             self._trail.pop()
-            self.screen.turn_to_page()
+            self.show(0)
 
 
 def _link(name: str, kind: str, edge: EdgeRecord | None) -> Link:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
+from textual.binding import Binding, BindingType
 from textual.content import Content
 
 from care_core.application.case import Request
@@ -13,42 +14,41 @@ from care_core.application.viewing import Past, past_runs
 from care_core.diagnose.verdict import fit_words
 from care_core.errors import CareError
 from care_core.text import clean
-from care_tui.pages.page import Fetch, Page, View, sentence
+from care_tui.messages import OpenLog
+from care_tui.pages.page import Page, View, enter_to, sentence, view_of
 from care_tui.render.rows import ASCII, Row, Rows, error_rows, labelled, padded, plain_rows, text
-from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
 
 NAME_WIDTH, VALUE_WIDTH = 18, 16
+RUNS, WHOLE = "runs", "both logs"
 TREND = 24
 """Newest runs that a trend shows."""
 
 
 class HistoryPage(Page):
-    name = "History"
     HELP = (
         "Runs that were triaged before, the newest first, with the trend of every objective up to the one under the "
         "cursor. Enter opens its log. x marks a run; then every other is compared with it, and Enter puts both logs "
         "side by side in full. / filters, Esc leaves."
     )
-    ENTER = "Its log"
-    ACTIONS: ClassVar[frozenset[str]] = frozenset({"mark"})
-
-    def __init__(self, screen: PanesScreen) -> None:
-        super().__init__(screen)
-        self._found: Fetch[list[Past]] = Fetch(self, "history")
-        self._marked: Past | None = None
-        self._compared: tuple[Past, Past | None] | None = None
-        self._whole: str | CareError | None = None
-        """What both logs of `_compared` are side by side; None as long as they are read."""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        enter_to("Open its log"),
+        Binding("x", "mark", "Compare", id="history.mark"),
+    ]
+    _marked: Past | None = None
+    _compared: tuple[Past, Past] | None = None
+    """The marked run and the one whose log was put beside it in full."""
 
     def enter(self) -> None:
-        self._found.start(past_runs)
+        self.forget(RUNS)
 
     def view(self) -> View:
-        return self._found.view("History", self._show)
+        return view_of("History", self.fetched(RUNS, past_runs), self._show)
 
-    def works(self, action: str) -> bool:
-        return super().works(action) and bool(self._found.answer)
+    @property
+    def _runs(self) -> list[Past]:
+        found = self._answers.get(RUNS)
+        return found if isinstance(found, list) else []
 
     def _show(self, runs: list[Past]) -> View:
         if not runs:
@@ -60,18 +60,21 @@ class HistoryPage(Page):
             lambda i: f"{runs[i].log} {runs[i].profile} {runs[i].verdict} {runs[i].cause}",
         )
         count = f"{len(runs)} run{'' if len(runs) == 1 else 's'}"
-        title = Content.assemble(f"History  {count}", ("  x marks one to compare with", "dim"))
+        title = Content(f"{count}; x marks one to compare with")
         if self._marked is not None:
-            title = Content.assemble("History  against ", (_named(self._marked), "bold"), ("  x again unmarks", "dim"))
-        return View(title, lambda i: Rows([]) if i is None else self._beside(i, runs), listing)
+            title = Content(f"Compared with {_named(self._marked)}; Enter: both in full; x again unmarks")
+        return View(title, lambda i: Rows([]) if i is None else self._beside(runs[i], i, runs), listing)
 
-    def _beside(self, index: int, runs: list[Past]) -> Rows:
+    def _beside(self, past: Past, index: int, runs: list[Past]) -> Rows:
         """What stands beside a run: both logs in full where that was asked for."""
-        if self._compared != (runs[index], self._marked):
+        if self._marked is None or self._compared != (self._marked, past):
             return Rows(self._detail(index, runs))
-        if isinstance(self._whole, CareError):
-            return error_rows(self._whole)
-        return sentence("Putting both side by side...") if self._whole is None else plain_rows(self._whole)
+        one, other = (Request(Path(run.log), mission=run.mission or None) for run in self._compared)
+        compare = self.workspace.engine.compare
+        whole = self.fetched(WHOLE, lambda: compare(one, other, _silent))
+        if isinstance(whole, CareError):
+            return error_rows(whole)
+        return sentence("Putting both side by side...") if whole is None else plain_rows(whole)
 
     def _item(self, past: Past) -> Content:
         mark = "*" if past == self._marked else " "
@@ -104,45 +107,30 @@ class HistoryPage(Page):
             return ""
         return f"{sparkline(known, ascii=self.glyphs is ASCII)}  {min(known):.4g} to {max(known):.4g}"
 
-    def leads_to(self) -> str:
-        runs, index = self._found.answer, self.screen.choices.highlighted
-        if self._marked is None or not isinstance(runs, list) or index is None or runs[index] == self._marked:
-            return self.ENTER
-        return "Both in full"
-
-    def moved(self, index: int) -> None:
-        self.screen.refresh_bindings()  # on the marked run Enter leads elsewhere
-
-    def open(self, index: int | None) -> None:
-        runs = self._found.answer
-        if not isinstance(runs, list) or index is None:
+    def action_open(self) -> None:
+        """Open the log of the run under the cursor, or put it beside the one that is marked."""
+        if not self._runs or self.index is None:
             return
-        if self._marked is None or runs[index] == self._marked:
-            self.walk.open_log(Path(runs[index].log))
-        else:
-            self._compare(self._marked, runs[index])
+        past = self._runs[self.index]
+        if self._marked is None or past == self._marked:
+            self.post_message(OpenLog(Path(past.log)))
+            return
+        self._compared = self._marked, past
+        self.forget(WHOLE)
+        self.show_text()
 
-    def _compare(self, a: Past, b: Past) -> None:
-        """Put the logs of two runs side by side, as far as they are still where they were."""
-        self._compared, self._whole = (b, a), None
-        one, other = (Request(Path(run.log), mission=run.mission or None) for run in (a, b))
-        compare = self.walk.engine.compare
-        self.screen.fetch("comparison", lambda job: compare(one, other, lambda *_: job.check()), self._receive)
-        self.screen.draw()
-
-    def _receive(self, whole: str | CareError) -> None:
-        self._whole = whole
-        if self.is_shown:
-            self.screen.draw()
-
-    def mark(self) -> None:
+    def action_mark(self) -> None:
         """Mark the run under the cursor to compare others with, or take the mark away."""
-        runs, index = self._found.answer, self.screen.choices.highlighted
-        if isinstance(runs, list) and index is not None:
+        runs, index = self._runs, self.index
+        if runs and index is not None:
             self._marked = None if runs[index] == self._marked else runs[index]
-            self.screen.draw()
+            self.show()
             if self._marked is not None and len(runs) > 1:
-                self.screen.say("Marked: go to another run to compare it with this one.")
+                self.say("Marked: go to another run to compare it with this one.")
+
+
+def _silent(_step: str, _share: float) -> None:
+    """Nobody is told how far a comparison has come."""
 
 
 def comparison(past: Past, other: Past) -> list[Row]:

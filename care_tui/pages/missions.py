@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
+from textual.binding import BindingType
 from textual.content import Content
 
-from care_core.application.case import Case
-from care_core.diagnose.records import MissionVerdict
+from care_core.diagnose.records import Diagnosis, MissionVerdict
+from care_core.records import replace
 from care_core.text import seconds
-from care_tui.pages.page import Page, View, sentence
+from care_tui.messages import Judge
+from care_tui.pages.page import Page, View, enter_to, sentence
 from care_tui.render.objectives import objective_item
 from care_tui.render.rows import Row, Rows, status, text, warning
-from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
 
 NAME_WIDTH = 18
 
 
 class MissionsPage(Page):
-    name = "Missions"
     HELP = "The missions of this log with their verdicts. Enter diagnoses the one under the cursor, Esc leaves."
-    ENTER = "Diagnose"
+    BINDINGS: ClassVar[list[BindingType]] = [enter_to("Diagnose it")]
+    _placed = False
 
-    def __init__(self, screen: PanesScreen, case: Case) -> None:
-        super().__init__(screen)
-        self._diagnosis = case.diagnosis
-        self._placed = False
+    @property
+    def _diagnosis(self) -> Diagnosis:
+        return self.session.diagnosis
 
     def view(self) -> View:
         missions = self._diagnosis.missions
         if not missions:
             none = "No profile fits this log, so no mission is judged."
-            return View(Content("Missions of the log"), lambda _: sentence(none))
+            return View(Content("Missions"), lambda _: sentence(none))
         count = f"{len(missions)} {self._diagnosis.run.noun}{'' if len(missions) == 1 else 's'}"
         listing = Listing(
             len(missions),
@@ -38,10 +40,7 @@ class MissionsPage(Page):
             lambda i: f"{missions[i].mission.index} {missions[i].reason}",
         )
         here, self._placed = None if self._placed else self._here - 1, True
-        return View(Content(f"The log holds {count}"), self._detail, listing, here)
-
-    def leads_to(self) -> str:
-        return self.ENTER if self._diagnosis.missions else ""
+        return View(Content(count), self._detail, listing, here)
 
     @property
     def _here(self) -> int:
@@ -63,6 +62,8 @@ class MissionsPage(Page):
         cut = warning("Mission", "the log stops before the mission does")
         return Rows(rows if verdict.mission.ended else [cut, *rows])
 
-    def open(self, index: int | None) -> None:
-        if index is not None:
-            self.walk.diagnose_mission(self._diagnosis.missions[index].mission.index)
+    def action_open(self) -> None:
+        """Diagnose the mission under the cursor."""
+        if self.index is not None and self.workspace.request is not None:
+            mission = self._diagnosis.missions[self.index].mission.index
+            self.post_message(Judge(replace(self.workspace.request, mission=mission)))

@@ -5,11 +5,17 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+from textual.binding import Binding, BindingType
+from textual.content import Content
+
+from care_core.application.proof import Subject
+from care_core.records import replace
 from care_core.text import clean
-from care_tui.pages.page import View, sentence
-from care_tui.pages.step import DiagnosisPage
-from care_tui.render.objectives import headline, objective_detail, objective_item, run_rows
-from care_tui.render.rows import Row, Rows, text
+from care_tui.messages import Judge
+from care_tui.pages.diagnosis import DiagnosisPage
+from care_tui.pages.page import View, enter_to, sentence
+from care_tui.render.objectives import counted, objective_detail, objective_item, run_rows
+from care_tui.render.rows import Rows, folded
 from care_tui.screens.prompt import Prompt
 from care_tui.widgets.choices import Listing
 
@@ -25,73 +31,92 @@ def _wrong(typed: str) -> str:
 
 
 class ObjectivesPage(DiagnosisPage):
-    name = "Objectives"
+    NAME = "objectives"
     NOTHING = "nothing is judged"
     HELP = (
-        "What the mission is judged by. Enter on an objective shows what caused its fault. = judges the one under the "
-        "cursor by another threshold: the log is judged again, and nothing is written to the profile."
+        "What the mission is judged by. Enter shows what caused the fault under the cursor, else the first fault that "
+        "has causes. = judges by a limit of your own, marked as mine: the log is judged again, nothing is written to "
+        "the profile. p shows the signals that an objective is measured on."
     )
-    ENTER = "Causes"
-    ACTIONS: ClassVar[frozenset[str]] = frozenset({"type_threshold"})
-
-    @property
-    def _is_empty(self) -> bool:
-        """Without a profile a run is still judged by what its robot says of itself."""
-        return super()._is_empty and not self.session.diagnosis.objectives
-
-    @property
-    def _unjudged(self) -> str:
-        return "" if self.session.diagnosis.objectives else super()._unjudged
+    BINDINGS: ClassVar[list[BindingType]] = [
+        enter_to("Causes"),
+        Binding("p", "prove", "Signal", id="objectives.proof"),
+        Binding("equals_sign,i", "type_threshold", "My limit", key_display="=", id="objectives.threshold"),
+        Binding("z", "fold", "Details", id="objectives.details"),
+    ]
+    _is_open = False
 
     def view_of_diagnosis(self) -> View:
         diagnosis, glyphs = self.session.diagnosis, self.glyphs
-        results = diagnosis.objectives
+        results, mine = diagnosis.objectives, self._mine
         if not results:
-            return View(headline(diagnosis, glyphs), lambda _: sentence("The profile declares no objective."))
+            return View(Content("Objectives"), lambda _: sentence("The profile declares no objective."))
         width = min(max(len(clean(result.variable.name)) for result in results), NAME_WIDTH)
         listing = Listing(
             len(results),
-            lambda i, _width: (objective_item(results[i], width, glyphs),),
+            lambda i, _width: (objective_item(results[i], width, glyphs, is_mine=results[i].name in mine),),
             lambda i: results[i].variable.name,
         )
-        return View(headline(diagnosis, glyphs), self._detail, listing, self.session.objective)
+        title = Content(f"Objectives: {counted(results)}")
+        return View(title, self._detail, listing, self.session.objective, "How it was judged")
+
+    @property
+    def _mine(self) -> dict[str, float]:
+        """The operator's own limits."""
+        return dict(self.workspace.request.thresholds) if self.workspace.request else {}
 
     def _detail(self, index: int | None) -> Rows:
-        diagnosis, model = self.session.diagnosis, self.session.case and self.session.case.model
+        diagnosis, case = self.session.diagnosis, self.session.case
         if index is None:
             return run_rows(diagnosis)
         result = diagnosis.objectives[index]
-        reading = self.session.case and self.session.case.reading
-        reference = reading.judged.reference.config if reading else {}
-        summary = model.summary_at(result.variable.name, reference) if model else None
+        reference = case.reading.judged.reference.config if case and case.reading else {}
+        summary = case.model.summary_at(result.variable.name, reference) if case and case.model else None
         rows = objective_detail(result, summary, self.glyphs)
-        return Rows([Row(text(result.variable.name, "bold")), *rows, Row(text("")), *run_rows(diagnosis).rows])
+        return Rows([*rows, *folded("This run", run_rows(diagnosis).rows, self.glyphs, is_open=self._is_open)])
 
     def moved(self, index: int) -> None:
         self.session.objective = index
 
-    def type_threshold(self) -> None:
-        """Ask for another threshold of the objective under the cursor."""
-        index = self.screen.choices.highlighted
-        if index is None:
+    def subject(self) -> Subject | None:
+        return None if self.index is None or not self.has_content else self.session.diagnosis.objectives[self.index]
+
+    def action_prove(self) -> None:
+        """Show the signals that the objective under the cursor is measured on."""
+        self.go("plots", None, self.subject())
+
+    def action_fold(self) -> None:
+        """Open or close the details of the run."""
+        self._is_open = not self._is_open
+        self.show_text(from_top=False)
+
+    def action_type_threshold(self) -> None:
+        """Judge the objective under the cursor by a limit of one's own."""
+        if self.index is None:
             return
-        result = self.session.diagnosis.objectives[index]
+        result = self.session.diagnosis.objectives[self.index]
         variable, bound = result.variable, result.threshold
         if variable.kind == "functional":
-            self.screen.say(f"{clean(variable.name)} is met or not: it has no other threshold.")
+            self.say(f"{variable.name} is met or not: it has no other threshold.")
             return
         unit = f" in {variable.unit}" if variable.unit else ""
         hint = f"A number{unit}; empty takes the profile's threshold again. Enter judges by it, Esc cancels."
         start = "" if bound is None else f"{bound.value:g}"
         sign = "" if bound is None else f" {bound.op}"
         prompt = Prompt(f"Judge {variable.name} by{sign}", start, hint, _wrong)
-        self.screen.app.push_screen(prompt, lambda typed: self._typed(variable.name, typed))
+        self.app.push_screen(prompt, lambda typed: self._typed(variable.name, typed))
 
     def _typed(self, objective: str, typed: str | None) -> None:
-        if typed is not None:
-            self.walk.judge_by(objective, float(typed) if typed else None)
+        request = self.workspace.request
+        if typed is None or request is None:
+            return
+        others = {name: value for name, value in request.thresholds.items() if name != objective}
+        bounds = {**others, objective: float(typed)} if typed else others
+        self.post_message(Judge(replace(request, thresholds=bounds), "objectives", objective))
 
-    def open(self, index: int | None) -> None:
-        if index is not None:
-            self.session.objective = index
-        self.walk.action_go(3)
+    def action_open(self) -> None:
+        """Go to the causes: those of the fault under the cursor, else of the first fault."""
+        if self.has_content and self.session.fault is None and self.session.first_fault():
+            result = self.session.result
+            self.say(f"Nothing explains that one; these are the causes of {result.name if result else 'the fault'}.")
+        self.go_on()

@@ -5,30 +5,24 @@ from __future__ import annotations
 from textual.content import Content
 
 from care_core.application.viewing import Installed, installed_profiles
-from care_tui.pages.page import Fetch, Page, View, sentence
+from care_tui.pages.page import Page, View, sentence, view_of
 from care_tui.render.rows import Row, Rows, padded, plain_rows, text
-from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
 
 
 class ProfilesPage(Page):
-    name = "Profiles"
     HELP = "The installed profiles. The text is the model card: what it was learned from, how good it is, its limits."
+    _placed = False
 
-    def __init__(self, screen: PanesScreen, used: str | None = None) -> None:
-        super().__init__(screen)
-        self._used = used
-        self._found: Fetch[list[Installed]] = Fetch(self, "profiles")
-        self._placed = False
-
-    def enter(self) -> None:
-        self._found.start(installed_profiles)
+    @property
+    def _used(self) -> str | None:
+        return None if self.session.case is None else self.session.diagnosis.profile.name
 
     def view(self) -> View:
-        return self._found.view("Profiles", self._show)
+        return view_of("Profiles", self.fetched("profiles", installed_profiles), self._show)
 
     def _show(self, profiles: list[Installed]) -> View:
-        title = Content(f"Profiles  {len(profiles)} installed")
+        title = Content(f"{len(profiles)} profiles are installed")
         if not profiles:
             return View(title, lambda _: sentence("No profile is installed."))
         names = [profile.name for profile in profiles]
@@ -39,7 +33,7 @@ class ProfilesPage(Page):
             lambda i, _width: (self._item(profiles[i]),),
             lambda i: f"{profiles[i].name} {profiles[i].platform}",
         )
-        return View(title, lambda i: Rows([]) if i is None else self._card(profiles[i]), listing, index)
+        return View(title, lambda i: Rows([]) if i is None else _card(profiles[i]), listing, index, "Model card")
 
     def _item(self, profile: Installed) -> Content:
         mark = self.glyphs.here if profile.name == self._used else " "
@@ -48,9 +42,10 @@ class ProfilesPage(Page):
         )
         return line + Content("  (used)") if profile.name == self._used else line
 
-    @staticmethod
-    def _card(profile: Installed) -> Rows:
-        return Rows(
-            Row(text(row.content.plain.lstrip("# "), "bold")) if row.content.plain.startswith("#") else row
-            for row in plain_rows(profile.card).rows
-        )
+
+def _card(profile: Installed) -> Rows:
+    """The card with its headings bold. Textual's Markdown is a widget a block: a card took five seconds to open."""
+    return Rows(
+        Row(text(row.content.plain.lstrip("# "), "bold")) if row.content.plain.startswith("#") else row
+        for row in plain_rows(profile.card).rows
+    )

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from care_core.diagnose.records import Cause, Diagnosis, ObjectiveResult, PathNode
-from care_core.text import clean
+from care_core.diagnose.records import Cause, Diagnosis, Hypothesis, ObjectiveResult, OutsideSuspect, PathNode
+from care_core.diagnose.verdict import hypothesis_text
+from care_core.ecosystems.findings import Finding
+from care_core.run import shown
+from care_core.text import clean, seconds
 from care_core.variables import Variable
 from care_tui.render.fix import prediction
-from care_tui.render.objectives import evidence_row, meaning
+from care_tui.render.objectives import meaning
+from care_tui.render.odds import bar, promise
 from care_tui.render.rows import (
+    FEW_RESAMPLES,
     Glyphs,
     Row,
     Rows,
     change_text,
     heading,
+    joined,
     labelled,
     limit,
     measure,
@@ -31,35 +38,49 @@ from care_tui.render.rows import (
 if TYPE_CHECKING:  # reading models is not needed for the first frame
     from care_core.causal.model import EffectRecord
 
-FEW_RESAMPLES = 0.5
-"""Edges that fewer bootstrap resamples hold are flagged."""
+BAR = 8
+"""Cells of the bar of a probability."""
+ROOMY = 90
+"""Cells from which on a line has room for how sure it is."""
 
 
-def cause_item(
-    cause: Cause, share: float | None, dismissed: str | None, glyphs: Glyphs, as_driven: float | None = None
-) -> tuple[Content, Content]:
-    """One cause of the ranked list: the option with its change, then what it is worth, with its caveats beside it.
+def cause_item(cause: Cause, share: float | None, dismissed: str | None, glyphs: Glyphs, width: int) -> Content:
+    """One cause of the ranked list on a line: how likely it is, the option with its change, and what weakens it.
 
     Args:
         share: its probability beside whatever else may explain the failure, None where nothing else was weighed.
-        as_driven: the odds that stand beside what its change promises.
     """
     option = cause.option
-    head = Content.assemble(
-        f"{cause.rank:>2} " if share is None else f"{percent(share):>5} ",
-        text(option.name, "bold"),
-        "  ",
-        change_text(option, cause.current, cause.is_assumed, cause.suggested, glyphs),
+    change = change_text(option, cause.current, cause.is_assumed, cause.suggested, glyphs)
+    line = Content.assemble(
+        _share(share, glyphs), text(option.name, "bold" if dismissed is None else "dim"), "  ", change
     )
-    below = " " * (3 if share is None else 6)
     if dismissed is not None:
-        return head, Content(f"{below}set aside: " + clean(dismissed))
-    worth = ["not ruled out" if cause.is_lead else f"{cause.confidence} confidence"]
-    if cause.p_fixed is not None:
-        without = "" if as_driven is None else f" (as driven {percent(as_driven)})"
-        worth.append(f"{percent(cause.p_fixed)} if only this is changed{without}")
-    caveats = "" if cause.is_lead else "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
-    return head, Content(below + ", ".join(worth) + caveats)
+        return line + text(f"  set aside: {dismissed}", "dim")
+    if cause.is_lead:
+        return line + Content("  not ruled out")
+    sure = f"  {cause.confidence} confidence" if share is None or width > ROOMY else ""
+    notes = caveats_of(cause)
+    return line + Content(sure) + (Content.styled(f"  ! {clean(notes[0])}", "$text-warning") if notes else Content())
+
+
+def hypothesis_item(
+    one: Hypothesis, finding: Finding | None, outside: Sequence[OutsideSuspect], glyphs: Glyphs
+) -> Content:
+    """An explanation that is no cause of the list on a line: how likely it is, what it is, and when it began."""
+    when = "" if finding is None else f"  from {seconds(finding.onset_s)}"
+    suspect = next((s for s in outside if s.name == one.name), None)
+    if suspect is not None:
+        when = f"  {shown(suspect.value)}, usually {shown(suspect.back)}"
+    words = hypothesis_text(one, [finding] if finding else ())
+    return Content.assemble(_share(one.probability, glyphs), text(words, "bold" if one.name else ""), text(when))
+
+
+def _share(share: float | None, glyphs: Glyphs) -> Content:
+    """The probability as a number and a bar, or as much room."""
+    if share is None:
+        return Content(" " * (BAR + 8))
+    return Content.assemble((f"{percent(share):>5} ", "bold"), bar(share, glyphs, BAR), "  ")
 
 
 def lowers(cause: Cause) -> str:
@@ -89,7 +110,7 @@ def path_rows(cause: Cause, objective: ObjectiveResult, glyphs: Glyphs) -> list[
             verdict = Content.assemble("  ", status(objective.status, glyphs), "  ")
             rows += [Row(line, width + 4), Row(verdict + text(limit(objective.threshold, node.unit)), 4)]
         else:
-            rows += [Row(line, width + 4), Row(edge_line(node, glyphs), 4)]
+            rows.append(Row(line, width + 4))
     return rows
 
 
@@ -101,59 +122,60 @@ def node_value(node: PathNode, option: Variable | None) -> str:
     return f"{measure(node.value, node.unit)}  (expected {expected})"
 
 
-def edge_line(node: PathNode, glyphs: Glyphs) -> Content:
-    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f} sd"
-    if node.support is None:
-        return Content.styled(f"{glyphs.line} {effect}", "dim")
-    line = Content.styled(f"{glyphs.line} {effect}, in {percent(node.support)} of resamples", "dim")
-    return line + Content.styled("  ! few", "$text-warning") if node.support < FEW_RESAMPLES else line
+def evidence_rows(cause: Cause, diagnosis: Diagnosis, dismissed: Mapping[str, str]) -> list[Row]:
+    """What this run shows of a cause: the parameter, what it leads to, what the log says, and what weakens it."""
+    option = cause.option
+    rows = [warning("Set aside", dismissed[option.name])] if option.name in dismissed else []
+    first, *others = cause.path
+    told = [Content.assemble(text(first.name, "bold"), " ", text(setting(option, first.value)))]
+    told += [Content.assemble(text(node.name, "bold"), " ", text(node_value(node, None))) for node in others[:-1]]
+    rows.append(labelled("This run", joined(told, ", ")))
+    said = [part for part in diagnosis.run.evidence if option.name in part.options]
+    rows += [labelled("" if i else "The log says", f"{part.text}{meaning(part)}, at {seconds(part.time_s)}")
+             for i, part in enumerate(said)]  # fmt: skip
+    return rows + [warning("Caveat", note) for note in caveats_of(cause)]
 
 
-def cause_detail(
-    cause: Cause,
-    rivals: Sequence[Cause],
-    objective: ObjectiveResult,
-    effect: EffectRecord | None,
-    diagnosis: Diagnosis,
-    dismissed: Mapping[str, str],
-    glyphs: Glyphs,
-) -> Rows:
-    """Everything about one cause: its path, what the log says, what it is worth, its caveats, the runner-up.
+def worth_rows(cause: Cause, result: ObjectiveResult, without: float | None, glyphs: Glyphs) -> list[Row]:
+    """What a change of the option alone is predicted to bring, and how sure the cause is."""
+    option = cause.option
+    rows = []
+    if cause.suggested is not None:
+        change = change_text(option, cause.current, cause.is_assumed, cause.suggested, glyphs)
+        rows.append(labelled("Change", Content.assemble(text(option.name, "bold"), " ", change)))
+    if cause.p_fixed is not None:
+        beside = "" if without is None else f"  without {percent(without)}"
+        rows.append(labelled("Odds of it", promise(cause.p_fixed, glyphs) + Content.styled(beside, "dim")))
+    if cause.predicted is not None and cause.suggested is not None:
+        rows.append(
+            labelled(
+                "Brings",
+                Content.assemble(text(f"{result.name} "), prediction(result.variable, cause.predicted, glyphs)),
+            )
+        )
+    rows.append(labelled("Confidence", cause.confidence))
+    if option.parameters and option.parameters != (option.name,):
+        rows.append(labelled("Parameter", ", ".join(option.parameters)))
+    return rows + ([labelled("About", option.doc)] if option.doc else [])
 
-    Where it is no more than a lead, the answer is that no cause was found: that, and what would tell more, come first.
-    """
-    option, evidence = cause.option, diagnosis.run.evidence
-    doubt = doubt_rows(diagnosis)
-    rows = [*doubt, Row(Content())] if cause.is_lead and doubt else []
-    rows += [*path_rows(cause, objective, glyphs), Row(Content())]
-    if option.name in dismissed:
-        rows.append(warning("Set aside", dismissed[option.name]))
-    alone = "" if cause.p_fixed is None else percent(cause.p_fixed)
-    gain = f"; {alone} probability of no fault if only this is changed" if alone else ""
-    rows.append(labelled("Confidence", f"{cause.confidence}{gain}"))
-    said = [part.text + meaning(part) for part in evidence if option.name in part.options]
-    rows += [labelled("" if place else "The log says", line) for place, line in enumerate(said)]
-    rows += [warning("Caveat", note) for note in caveats_of(cause)]
+
+def statistics_rows(cause: Cause, rivals: Sequence[Cause], effect: EffectRecord | None, glyphs: Glyphs) -> list[Row]:
+    """How the training runs bear a cause out."""
+    rows = []
+    for node, after in pairwise(cause.path):
+        rows.append(Row(Content.assemble(text(f"{node.name} {glyphs.to} {after.name}  "), edge_line(node)), 4))
     if not cause.is_lead:
         rows.append(labelled("Contribution", f"{lowers(cause)} of a run without a fault"))
         rows += _runner_up(cause, rivals)
-    if cause.predicted is not None and cause.suggested is not None:
-        change = change_text(option, cause.current, cause.is_assumed, cause.suggested, glyphs)
-        rows.append(labelled("With", change + Content(": ") + prediction(objective.variable, cause.predicted, glyphs)))
-    rows.append(labelled("Usual effect", _effect(cause, effect)))
-    if option.parameters and option.parameters != (option.name,):
-        rows.append(labelled("Parameter", ", ".join(option.parameters)))
-    if option.doc:
-        rows.append(labelled("About", option.doc))
-    if not cause.is_lead and doubt:
-        rows += [Row(Content()), *doubt]
-    if evidence:
-        rows += [
-            Row(Content()),
-            heading("Messages of this run"),
-            *(evidence_row(part, option.name) for part in evidence),
-        ]
-    return Rows(rows)
+    return [*rows, labelled("Usual effect", _effect(cause, effect))]
+
+
+def edge_line(node: PathNode) -> Content:
+    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f} sd"
+    if node.support is None:
+        return Content(effect)
+    line = Content(f"{effect}, in {percent(node.support)} of resamples")
+    return line + Content.styled("  ! few", "$text-warning") if node.support < FEW_RESAMPLES else line
 
 
 def _runner_up(cause: Cause, rivals: Sequence[Cause]) -> list[Row]:

@@ -12,19 +12,11 @@ from care_core.run import Run
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.basket import possible
-from care_tui.render.rows import (
-    Glyphs,
-    Row,
-    Rows,
-    change_text,
-    heading,
-    measure,
-    padded,
-    percent,
-    status,
-    text,
-    warning,
-)
+from care_tui.render.odds import promise
+from care_tui.render.rows import Glyphs, Row, Rows, change_text, heading, measure, padded, text, warning
+
+BAR, CHANGE = 6, 32
+"""Cells of the bar of the odds alone, and those behind the name before it."""
 
 
 def option_item(
@@ -33,34 +25,36 @@ def option_item(
     is_assumed: bool,
     value: float | None,
     ticked: bool,
-    alone: str,
+    alone: float | None,
     width: int,
     glyphs: Glyphs,
 ) -> Content:
-    """One option of the basket on one line: its box, its name padded to `width`, its change, its probability alone."""
+    """One option of the basket on one line: its box, its name padded to `width`, its change, the odds of it alone."""
     box = ("[x]" if ticked else "[ ]") if value is not None else "   "
     change = change_text(option, current, is_assumed, value, glyphs)
     line = Content.assemble(f"{box} ", padded(option.name, width + 2, "bold" if ticked else ""), change)
     if ticked and option.reboot_required:
         line += Content.styled("  ! reboot", "$text-warning")
-    return line + Content.styled(f"  {alone}", "dim") if alone else line
+    if alone is None:
+        return line
+    return line.pad_right(max(width + CHANGE - line.cell_length, 2)) + promise(alone, glyphs, BAR) + Content(" alone")
 
 
 def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs) -> list[Row]:
-    """What every objective should become."""
+    """What every objective should become, as bars of how likely each is kept."""
     width = max((len(clean(result.variable.name)) for result in objectives), default=0)
     rows = []
     for result in objectives:
         predicted = fix.predicted.get(result.variable.name)
         outcome = (
-            status("not_evaluated", glyphs) + Content("  no prediction")
+            Content("no prediction")
             if predicted is None
             else prediction(result.variable, predicted, glyphs, is_guess=fix.is_guess)
         )
-        rows.append(Row(Content.assemble("  ", padded(result.variable.name, width + 2), outcome), width + 4))
+        line = Content.assemble(padded(result.variable.name, width + 2), outcome)
         if result.value is not None and result.variable.kind != "functional":
-            now = f"now {measure(result.value, result.variable.unit)}"
-            rows[-1] = Row(rows[-1].content + Content.styled(f"  ({now})", "dim"), width + 4)
+            line += Content.styled(f"  (now {measure(result.value, result.variable.unit)})", "dim")
+        rows.append(Row(line, width + 2))
     return rows
 
 
@@ -85,13 +79,13 @@ def known_rows(option: Variable, run: Run) -> list[Row]:
 
 
 def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs, *, is_guess: bool = False) -> Content:
-    """`✓ OK  139, 131 to 150 s, probability 91 %`."""
-    guess = " (a guess)" if is_guess else ""
-    probability = "" if predicted.p_ok is None else f", probability {percent(predicted.p_ok)}{guess}"
+    """`█████████░  91 %  139, 131 to 150 s`: how likely the objective is kept, and the value with its interval."""
+    odds = Content("odds not measured") if predicted.p_ok is None else promise(predicted.p_ok, glyphs)
+    guess = Content.styled(" a guess" if is_guess else "", "$text-warning")
     if variable.kind == "functional":  # a yes-or-no objective has a probability, not a value
-        return status(predicted.status(), glyphs) + text(probability.replace(",", " ", 1))
+        return odds + guess
     span = f"  {predicted.value:.4g}, {predicted.low:.4g} to {measure(predicted.high, variable.unit)}"
-    return status(predicted.status(), glyphs) + text(f"{span}{probability}")
+    return odds + guess + text(span)
 
 
 def no_fix_rows(diagnosis: Diagnosis) -> Rows:

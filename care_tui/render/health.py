@@ -6,16 +6,14 @@ from collections.abc import Sequence
 
 from textual.content import Content
 
-from care_core.diagnose.records import Diagnosis, Hypothesis, OutsideSuspect
-from care_core.diagnose.verdict import Verdict, hypothesis_text, verdict_of
+from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.ecosystems.findings import Event, Finding, Health, Severity
 from care_core.records import Record
 from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, noted
-from care_core.run import shown
-from care_core.text import clean, seconds
+from care_core.text import seconds
 from care_tui.render.objectives import damage
-from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, status, text, warning
+from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, text, warning
 
 TIME_WIDTH, KIND_WIDTH = 8, 10
 _SHORT = {"led to": "led to", "followed by": "then", "seen just before it": "before"}
@@ -95,30 +93,6 @@ def finding_rows(finding: Finding, cause: Finding | None = None, link: str = "")
     return rows
 
 
-def verdict_line(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
-    """What robot this is, and the verdict on its run."""
-    health, verdict = diagnosis.health, verdict_of(diagnosis)
-    robot = Content(clean(f"{health.robot}: " if health.robot else ""))
-    return Content.assemble(robot, status(verdict.status, glyphs), *told(verdict))
-
-
-def told(verdict: Verdict) -> tuple[str, tuple[str, str]]:
-    """What the verdict says behind its word."""
-    return ", " if verdict.has_but else "  ", (verdict.failed, "bold")
-
-
-def standing(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Content]:
-    """How far the answer carries, for every step: the fit of the profile, then what limits the answer besides."""
-    fit = diagnosis.profile.fit
-    style = {"fits": "", "partly": "$text-warning", "no": "bold $text-error"}[fit.verdict]
-    mark = "" if fit.verdict == "fits" else "! "
-    lines = [Content.styled(f"{mark}{verdict_of(diagnosis).fit}", style)]
-    limits = warnings_of(diagnosis)
-    if limits:
-        lines.append(Content.styled("! " + clean("; ".join(limits)), "$text-warning"))
-    return lines
-
-
 def warnings_of(diagnosis: Diagnosis) -> list[str]:
     """What limits the answer, beside the fit of the profile; the gravest first."""
     run = diagnosis.run
@@ -156,20 +130,6 @@ def fit_rows(diagnosis: Diagnosis, advice: Sequence[str]) -> list[Row]:
     return rows + (
         [heading("What would make one fit"), *(Row(text(f"- {one}"), 2) for one in advice)] if advice else []
     )
-
-
-def hypothesis_item(
-    one: Hypothesis, finding: Finding | None, outside: Sequence[OutsideSuspect] = ()
-) -> tuple[Content, Content]:
-    """An explanation that is no cause of the list: how likely it is, what it is, and when it began."""
-    when = "" if finding is None else f", from {seconds(finding.onset_s)}"
-    suspect = next((s for s in outside if s.name == one.name), None)
-    parameter = "a parameter" if suspect is None else f"{shown(suspect.value)}, usually {shown(suspect.back)}"
-    kind = {"hardware": "a part of the robot", "world": "something in the environment", "parameter": parameter}
-    head = Content.assemble(
-        f"{percent(one.probability):>5} ", text(hypothesis_text(one, [finding] if finding else ()), "bold")
-    )
-    return head, Content(f"      {kind[one.what]}{when}" if one.name and one.what in kind else "")
 
 
 def hypothesis_rows(one: Hypothesis, finding: Finding | None, notes: Sequence[str] = ()) -> list[Row]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
-from care_core.diagnose.verdict import STATUS_WORDS, verdict_of
+from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.run import Damage, Evidence, is_known
-from care_core.text import clean
+from care_core.text import clean, seconds
 from care_tui.render.rows import (
     Glyphs,
     Row,
@@ -33,20 +34,15 @@ BOUND_WIDTH = 12
 STRIP_WIDTH = 42
 
 
-def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
-    """The verdict on the run in one line: what failed, else how many of all three states, so that it never reads as a
-    false all-clear."""
-    verdict = verdict_of(diagnosis)
-    if verdict.status == "fault":
-        return Content.assemble(status(verdict.status, glyphs), "  ", (verdict.failed, "bold"))
-    statuses = [objective.status for objective in diagnosis.objectives]
+def counted(results: Sequence[ObjectiveResult]) -> str:
+    """How many of all three states, so that it never reads as a false all-clear."""
+    statuses = [objective.status for objective in results]
     faults, unknown = statuses.count("fault"), statuses.count("not_evaluated")
-    counts = f"  {faults} outside, {statuses.count('ok')} within, {unknown} not evaluated"
-    return status(verdict.status, glyphs) + Content(counts)
+    return f"{faults} outside, {statuses.count('ok')} within, {unknown} not evaluated"
 
 
-def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Content:
-    """One objective on one line: status, name padded to `width`, value, threshold."""
+def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs, *, is_mine: bool = False) -> Content:
+    """One objective on one line: status, name padded to `width`, value, threshold, whose limit it is."""
     variable, bound = result.variable, result.threshold
     wanted = "no threshold" if bound is None else f"{bound} {variable.unit}".rstrip()
     if result.value is None and result.need is not None:
@@ -56,6 +52,7 @@ def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Conte
         padded(variable.name, width + 2, "bold"),
         padded("" if result.value is None else measure(result.value, variable.unit), VALUE_WIDTH),
         padded(wanted, BOUND_WIDTH),
+        ("mine  " if is_mine else "", "bold $text-accent"),
         text(result.reason, "dim"),
     )
 
@@ -107,10 +104,10 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
     rows = [
         heading("This run"),
         labelled("Log", log.path),
-        labelled("", f"{log.format}, {start}, {log.duration_s:.0f} s"),
+        labelled("", f"{log.format}, {start}, {seconds(log.duration_s)}"),
     ]
     if mission.count:
-        span = f"from {mission.start_s:.1f} s to {mission.end_s:.1f} s of the log"
+        span = f"from {seconds(mission.start_s)} to {seconds(mission.end_s)} of the log"
         rows.append(labelled(diagnosis.run.noun.capitalize(), f"{mission.index} of {mission.count}, {span}"))
     if profile.name:
         rows.append(labelled("Profile", f"{profile.title} {profile.version} ({profile.platform})"))
@@ -136,14 +133,14 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
 
 def damage(part: Damage) -> str:
     byte = "" if part.byte is None else f" at byte {part.byte}"
-    time = "" if part.time_s is None else f" at {part.time_s:.1f} s"
+    time = "" if part.time_s is None else f" at {seconds(part.time_s)}"
     return f"{part.what}{byte}{time}"
 
 
 def evidence_row(part: Evidence, option: str = "") -> Row:
     """A message of the log; marked where it points at `option`."""
     points = option and option in part.options
-    head = f"{part.time_s:8.1f} s  {clean(part.kind):<9} "
+    head = f"{seconds(part.time_s):>9}  {clean(part.kind):<9} "
     tail = "  (points at this parameter)" if points else ""
     return Row(Content.assemble(head, text(part.text + meaning(part)), (tail, "bold")), len(head))
 

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from textual.content import Content
+
+from care_core.application.signals import Signal, Trace
+from care_core.ecosystems.dictionary import Field
+from care_core.records import Record
+from care_core.report.axes import tick_time, time_ticks, value_ticks
+from care_core.report.marks import Mark
+from care_core.text import LONG_S, clean, seconds
+from care_tui.render.health import sign_of
+from care_tui.render.rows import ASCII, Glyphs, Row, text
 
 _BITS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 """Bits of the dots of a braille cell: by column, from the top down."""
 
 EMPTY = 0x2800
 """The braille cell without a dot."""
-WANTED = "$text-accent"
+ACTUAL, WANTED = "$text-accent", "$text-primary"
+AXIS = 9
+"""Cells for the numbers left of a plot, with a gap."""
+LOWEST = 4
+"""Lines of a plot at least."""
 Column = tuple[float, float] | None
+Cells = tuple[int, int]
 
 
 def dots_across(width: int, *, ascii: bool) -> int:
@@ -20,7 +34,7 @@ def dots_across(width: int, *, ascii: bool) -> int:
     return width if ascii else 2 * width
 
 
-def plot(
+def plot(  # noqa: PLR0913 (a plot has all of these)
     columns: Sequence[Column],
     low: float,
     high: float,
@@ -30,6 +44,9 @@ def plot(
     wanted: Sequence[Column] = (),
     cursor: int | None = None,
     rule: str = "|",
+    span: Cells | None = None,
+    zero: str = "",
+    shaded: str = " ",
 ) -> list[Content]:
     """Lines of cells, from the top down. A column is drawn from its least to its greatest value.
 
@@ -40,6 +57,8 @@ def plot(
         height: lines of cells.
         wanted: what the line was to follow, drawn dotted behind it, and in a colour where there are colours.
         cursor: column of cells to mark by a line of `rule` where nothing else is drawn.
+        span: the first and the last column of cells that are shaded, with the sign `shaded`.
+        zero: what the line of zero is drawn with, where it lies between both ends.
     """
     tall = height if ascii else 4 * height
     actual = _filled(columns, low, high, tall)
@@ -47,6 +66,7 @@ def plot(
     behind = [part if ascii or x % 4 == 0 else None for x, part in enumerate(_filled(wanted, low, high, tall))]
     behind += [None] * (len(actual) - len(behind))
     across = 1 if ascii else 2
+    at_zero = _row(0.0, low, high, height) if zero and low < 0 < high else None
     lines = []
     for y in range(height):
         cells = []
@@ -55,10 +75,13 @@ def plot(
                 (_star(parts[x], tall - 1 - y, sign) if ascii else _cell(parts[x : x + 2], tall - 1 - 4 * y))
                 for parts, sign in ((actual, "*"), (behind, "."))
             )
-            empty = rule if x // across == cursor else " "
+            place = x // across
+            shade = span is not None and span[0] <= place <= span[1]
+            empty = rule if place == cursor else zero if y == at_zero else shaded if shade else " "
             both = here if ascii and here != " " else there if here == " " else _together(here, there)
-            cells.append((both, WANTED if here == " " != there else "") if both != " " else (empty, "dim"))
-        lines.append(_assembled(cells))
+            style = "dim" if both == " " else WANTED if here == " " else ACTUAL
+            cells.append((empty if both == " " else both, style))
+        lines.append(assembled(cells))
     return lines
 
 
@@ -67,7 +90,7 @@ def _filled(columns: Sequence[Column], low: float, high: float, tall: int) -> li
     span = (high - low) or 1.0
 
     def dot(value: float) -> int:
-        return round((value - low) / span * (tall - 1))
+        return min(max(round((value - low) / span * (tall - 1)), 0), tall - 1)
 
     return [None if part is None else (dot(part[0]), dot(part[1])) for part in columns]
 
@@ -86,17 +109,113 @@ def _cell(pair: Sequence[tuple[int, int] | None], top: int) -> str:
     return chr(EMPTY + bits) if bits else " "
 
 
+def dot_sign(dots: Collection[tuple[int, int]]) -> str:
+    """The braille sign of these dots of a cell, by column and by row from the top down."""
+    return chr(EMPTY + sum(_BITS[x][y] for x, y in dots))
+
+
 def _together(here: str, there: str) -> str:
     """The dots of both cells."""
     return here if there == " " else chr(EMPTY + ((ord(here) - EMPTY) | (ord(there) - EMPTY)))
 
 
-def _assembled(cells: Sequence[tuple[str, str]]) -> Content:
+def assembled(cells: Sequence[tuple[str, str]]) -> Content:
     """Cells with their styles, neighbours of one style as one piece: each piece costs bytes."""
     pieces: list[tuple[str, str]] = []
     for sign, style in cells:
         if pieces and (pieces[-1][1] == style or sign == " "):
             pieces[-1] = pieces[-1][0] + sign, pieces[-1][1]
         else:
-            pieces.append((sign, style if sign != " " else ""))
+            pieces.append((sign, style))
     return Content.assemble(*(piece if piece[1] else piece[0] for piece in pieces))
+
+
+class Figure(Record):
+    """A signal drawn over a span of the log, with all that stands around it."""
+
+    signal: Signal
+    meaning: Field
+    trace: Trace
+    marks: Sequence[Mark] = ()
+    start_s: float | None = None
+    end_s: float | None = None
+    """The time of the finding that it shows."""
+    cursor_s: float | None = None
+
+    def rows(self, width: int, height: int, glyphs: Glyphs) -> list[Row]:
+        """The figure in so many cells: what it is, the plot, what happened, and the axis of time."""
+        trace, wide = self.trace, max(width - AXIS, 10)
+        high = max(height - 3, LOWEST)
+        span = self._span(wide)
+        cursor = None if self.cursor_s is None else self._place(self.cursor_s, wide)
+        lines = plot(
+            trace.columns, trace.low, trace.high, high, ascii=glyphs is ASCII, wanted=trace.wanted, cursor=cursor,
+            rule=glyphs.line, span=span, zero=glyphs.rule,
+            shaded=glyphs.shade,
+        )  # fmt: skip
+        labels = self._labels(high)
+        rows = [Row(self._head(glyphs).truncate(width))]
+        rows += [Row(Content.styled(f"{labels.get(y, ''):>{AXIS - 1}} ", "dim") + line) for y, line in enumerate(lines)]
+        return [*rows, Row(self._signs(wide, span, glyphs)), Row(self._times(wide))]
+
+    def _head(self, glyphs: Glyphs) -> Content:
+        unit = f", {self.meaning.unit}" if self.meaning.unit else ""
+        named = text(f"{self.meaning.label}{unit}", "bold")
+        head = Content.assemble(named, "  " if self.meaning.label else "", text(self.signal.name, f"bold {ACTUAL}"))
+        if not self.trace.wanted:
+            return head
+        sign = ". " if glyphs is ASCII else ""
+        return head + Content.styled(f"  {sign}{clean(self.signal.wanted_name)} (wanted)", WANTED)
+
+    def _labels(self, high: int) -> dict[int, str]:
+        """Round numbers at the lines nearest to them, and both ends where there is no round one."""
+        low, top = self.trace.low, self.trace.high
+        if not low < top:
+            return {high - 1: _number(low)}
+        ticks = {_row(value, low, top, high): _number(value) for value in value_ticks(low, top, max(high // 3, 2))}
+        return ticks or {0: _number(top), high - 1: _number(low)}
+
+    def _signs(self, wide: int, span: Cells | None, glyphs: Glyphs) -> Content:
+        """What happened, and the time of the finding as a line."""
+        signs = [" "] * wide
+        if span is not None:
+            signs[span[0] : span[1] + 1] = glyphs.rule * (span[1] + 1 - span[0])
+        for mark in reversed([mark for mark in self.marks if self.trace.start_s <= mark.time_s <= self.trace.end_s]):
+            signs[self._place(mark.time_s, wide)] = sign_of(mark, glyphs)
+        return Content(f"{'':>{AXIS}}{''.join(signs)}")
+
+    def _times(self, wide: int) -> Content:
+        """Round times below the plot; the last says its unit."""
+        cells = [" "] * (wide + AXIS)
+        ticks = time_ticks(self.trace.start_s, self.trace.end_s, max(wide // 14, 2))
+        for time_s in ticks:
+            words = tick_time(time_s) + (" s" if time_s == ticks[-1] < LONG_S else "")
+            first = min(AXIS + self._place(time_s, wide), len(cells) - len(words))
+            cells[first : first + len(words)] = words
+        return Content.styled("".join(cells), "dim")
+
+    def _span(self, wide: int) -> Cells | None:
+        start_s, end_s = self.start_s, self.end_s
+        if start_s is None or end_s is None or end_s < self.trace.start_s or start_s > self.trace.end_s:
+            return None
+        return self._place(start_s, wide), self._place(end_s, wide)
+
+    def _place(self, time_s: float, wide: int) -> int:
+        share = (time_s - self.trace.start_s) / max(self.trace.end_s - self.trace.start_s, 1e-9)
+        return min(max(int(share * wide), 0), wide - 1)
+
+
+def mark_rows(marks: Sequence[Mark], glyphs: Glyphs) -> list[Row]:
+    """Marks in words, below the figure whose axis has their signs."""
+    return [Row(text(f"{sign_of(mark, glyphs)} {seconds(mark.time_s):>8}  {mark.words}"), 12) for mark in marks]
+
+
+def _row(value: float, low: float, high: float, height: int) -> int:
+    """The line of cells of a value, from the top down."""
+    return min(max(round((high - value) / ((high - low) or 1.0) * (height - 1)), 0), height - 1)
+
+
+def _number(value: float) -> str:
+    """A round number in the cells beside the axis."""
+    shown = f"{value:.6g}"
+    return shown if len(shown) < AXIS else f"{value:.2g}"

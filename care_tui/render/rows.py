@@ -49,6 +49,8 @@ class Glyphs(Record):
     ahead: str
     more: str
     rule: str
+    open: str
+    shade: str
 
 
 UNICODE = Glyphs(
@@ -64,6 +66,8 @@ UNICODE = Glyphs(
     ahead="░",
     more="…",
     rule="─",
+    open="▾",
+    shade="·",
 )
 ASCII = Glyphs(
     ok="+",
@@ -78,6 +82,8 @@ ASCII = Glyphs(
     ahead=".",
     more="~",
     rule="-",
+    open="v",
+    shade=":",
 )
 
 _COLOURS: dict[Status, str] = {"ok": "$text-success", "fault": "bold $text-error", "not_evaluated": "$text-warning"}
@@ -167,6 +173,14 @@ def labelled(label: str, value: Content | str, style: str = "") -> Row:
 
 def heading(value: str) -> Row:
     return Row(text(value, "bold"))
+
+
+def folded(title: str, rows: Sequence[Row], glyphs: Glyphs, *, is_open: bool) -> list[Row]:
+    """A part of a text that can be put away: `z` opens and closes those of a page."""
+    if not rows:
+        return []
+    head = Content.assemble((f"{glyphs.open if is_open else glyphs.here} {title}", "bold"), ("  z", "dim"))
+    return [Row(Content()), Row(head), *(rows if is_open else ())]
 
 
 def warning(label: str, value: str) -> Row:

@@ -17,27 +17,10 @@ from care_core.application.case import Case
 from care_core.errors import CareError, UsageError
 from care_core.report.formats import Format, format_of, suffixes_text
 from care_core.text import clean
-from care_tui.jobs import Engine, as_care_error
+from care_tui.engine import Engine, as_care_error
 from care_tui.places import at_home
+from care_tui.screens.confirm import Confirm
 from care_tui.widgets.line_input import LineInput
-
-
-class OverwriteDialog(ModalScreen[bool]):
-    """Asks before a file is replaced."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("y", "dismiss(True)", "Replace", id="overwrite.yes"),
-        Binding("n,escape", "dismiss(False)", "Keep", id="overwrite.no"),
-    ]
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self._path = path
-
-    def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog small"):
-            yield Static(Content.assemble((clean(str(self._path)), "bold"), " exists. Replace it?"))
-            yield Static("y replaces it, n or Esc keeps it", classes="hint", markup=False)
 
 
 class ExportDialog(ModalScreen[str | None]):
@@ -72,7 +55,7 @@ class ExportDialog(ModalScreen[str | None]):
             self._say(UsageError(f"The file name must end in {suffixes_text()}."))
         elif path.is_dir():
             self._say(UsageError("This is a folder.", hint="Name a file in it."))
-        elif not path.exists() or await self.app.push_screen_wait(OverwriteDialog(path)):
+        elif not path.exists() or await self.app.push_screen_wait(_replacing(path)):
             error = await self._write(path, format).wait()
             if error is None:
                 self.dismiss(str(path.absolute()))
@@ -89,3 +72,7 @@ class ExportDialog(ModalScreen[str | None]):
 
     def _say(self, error: CareError) -> None:
         self.query_one(".error", Static).update(Content.styled(f"! {clean(str(error))}", "bold $text-error"))
+
+
+def _replacing(path: Path) -> Confirm:
+    return Confirm(f"{path} exists. Replace it?", "y replaces it, n or Esc keeps it")

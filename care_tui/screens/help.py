@@ -13,7 +13,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from care_tui.render.rows import Row, Rows
-from care_tui.widgets.lines import Lines
+from care_tui.widgets.reader import Reader
 
 Keys = Iterable[tuple[str, str, str]]
 """Keys, what they do, and the id by which the settings give the action another key."""
@@ -42,4 +42,4 @@ class HelpScreen(ModalScreen[None]):
         ]
         with Vertical(classes="dialog"):
             yield Static("Keys that work here (Esc closes)", classes="title", markup=False)
-            yield Lines(Rows(rows), id="help")
+            yield Reader(Rows(rows), id="help")

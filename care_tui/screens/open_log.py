@@ -65,11 +65,12 @@ class OpenLogDialog(ModalScreen[Path | None]):
         return text(f"{path.name}/", "bold") if path.is_dir() else text(path.name)
 
     def action_move(self, by: int) -> None:
-        self.query_one(Choices).action_move(by)
+        choices = self.query_one(Choices)
+        choices.action_cursor_down() if by > 0 else choices.action_cursor_up()
 
     def action_complete(self) -> None:
         """Put the entry under the cursor into the line."""
-        index = self.query_one(Choices).highlighted
+        index = self.query_one(Choices).index
         if index is not None:
             self._put(self._entries[index])
 
@@ -82,7 +83,7 @@ class OpenLogDialog(ModalScreen[Path | None]):
     def _submit(self, event: Input.Submitted) -> None:
         event.stop()
         typed = as_path(event.value)
-        index = self.query_one(Choices).highlighted
+        index = self.query_one(Choices).index
         path = typed if typed.is_file() or index is None else self._entries[index]
         if path.is_file() or is_openable(path):
             self.dismiss(path)

@@ -1,19 +1,27 @@
-"""A list to choose from, with the same keys everywhere. Only what is visible is ever built."""
+"""A list to choose from, with the same keys everywhere. An item is built when it comes into view."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.content import Content
-from textual.events import Click, Resize
-from textual.geometry import Size
-from textual.message import Message
+from textual.css.styles import RulesMap
+from textual.events import Resize
+from textual.reactive import reactive
+from textual.strip import Strip
+from textual.style import Style
+from textual.visual import RenderOptions, Visual
+from textual.widgets import OptionList
+from textual.widgets.option_list import Option
 
 from care_core.records import Record
-from care_tui.widgets.line_view import MARGIN, SCROLL_KEYS, LineView
+
+SCROLL_KEYS: list[BindingType] = [
+    Binding("pagedown,ctrl+f", "page_down", "Page down", show=False, id="text.page-down"),
+    Binding("pageup,ctrl+u", "page_up", "Page up", show=False, id="text.page-up"),
+]
 
 
 class Listing(Record):
@@ -31,142 +39,147 @@ class Listing(Record):
 NOTHING = Listing(0, lambda _index, _width: (), lambda _index: "")
 
 
-class Choices(LineView):
-    """A list that moves with the arrows and with j, k, g and G. An item is never wrapped: its end is cut off."""
+class _Lines(Visual):
+    """So many lines, for Textual to count: `Choices` draws them itself."""
+
+    def __init__(self, height: int) -> None:
+        self._height = height
+
+    def render_strips(self, width: int, height: int | None, style: Style, options: RenderOptions) -> list[Strip]:
+        return [Strip.blank(width, style.rich_style)] * self._height
+
+    def get_optimal_width(self, rules: RulesMap, container_width: int) -> int:
+        return container_width
+
+    def get_minimal_width(self, rules: RulesMap) -> int:
+        return 1
+
+    def get_height(self, rules: RulesMap, width: int) -> int:
+        return self._height
+
+
+class Choices(OptionList, inherit_bindings=False):
+    """Textual's option list for long lists: it stops at its ends, never wraps an item, and paints only the lines that
+    changed. Enter is left to the page."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("down,j", "move(1)", "Next", show=False, id="list.down"),
-        Binding("up,k", "move(-1)", "Previous", show=False, id="list.up"),
-        Binding("home,g", "move(-1000000)", "First", show=False, id="list.first"),
-        Binding("end,G", "move(1000000)", "Last", show=False, id="list.last"),
+        Binding("down,j", "cursor_down", "Next", show=False, id="list.down"),
+        Binding("up,k", "cursor_up", "Previous", show=False, id="list.up"),
+        Binding("home,g", "first", "First", show=False, id="list.first"),
+        Binding("end,G", "last", "Last", show=False, id="list.last"),
         *SCROLL_KEYS,
     ]
+    highlighted: reactive[int | None] = reactive(None, repaint=False)
 
-    @dataclass
-    class Chosen(Message):
-        """An item was clicked while it was highlighted."""
-
-        index: int
-
-    def __init__(self, more: str, *, moved: Callable[[], None] = lambda: None, id: str | None = None) -> None:
-        """`moved` is called when the cursor came to another item. No message: it would cost a frame of its own."""
-        super().__init__(id=id)
+    def __init__(self, more: str, *, id: str | None = None) -> None:
+        """`more` stands for what is cut off."""
+        super().__init__(id=id, markup=False)
         self._more = more
-        self._moved = moved
-        self._listing = NOTHING
-        self._kept: range | list[int] = range(0)
+        self.listing = NOTHING
+        self._shown: list[int] = []
+        self._height = 0
         self._filter = ""
-        self._cursor = 0
+        self._painted: dict[int, Content] = {}
+        self.clicked_on: int | None = None
+        """Where the cursor was when the mouse was clicked last."""
 
     @property
-    def highlighted(self) -> int | None:
+    def index(self) -> int | None:
         """The item under the cursor, counted from 0 before filtering."""
-        return self._kept[self._cursor] if self._kept else None
-
-    @property
-    def option_count(self) -> int:
-        """How many items are shown."""
-        return len(self._kept)
+        return None if self.highlighted is None or not self._shown else self._shown[self.highlighted]
 
     @property
     def plain(self) -> str:
         """The items as shown, one line each."""
-        return "\n".join(
-            line.plain for index in self._kept for line in self._listing.item(index, max(self.text_width, 60))
-        )
+        width = max(self.scrollable_content_region.width - 2, 60)
+        return "\n".join(line.plain for index in self._shown for line in self.listing.item(index, width))
 
     def show(self, listing: Listing, index: int | None = None) -> None:
-        """Replace the items and put the cursor on `index`; no message is sent."""
-        lines = self.line_count
-        self._listing = listing
-        self._keep()
-        self.put(index)
-        if self.line_count != lines:
-            self.refresh(layout=True)
+        """Replace the items and put the cursor on `index`, else on the first; no message is sent."""
+        self.listing = listing
+        self._fill(index)
 
-    def put(self, index: int | None) -> None:
-        """Put the cursor on an item; on the first when it is not shown."""
-        kept = list(self._kept)
-        self._cursor = kept.index(index) if index in kept else 0
-        self._bring_into_view()
-        self.sync()
-
-    def filter(self, words: str) -> None:
-        """Show only the items that hold these words; all of them when empty. `moved` is not called."""
+    def filter(self, words: str) -> bool:
+        """Show only the items that hold these words; all of them when empty. False where that changes nothing. No
+        message is sent."""
         if words.casefold() == self._filter:
-            return
-        here = self.highlighted
-        self._filter = words.casefold()
-        self._keep()
-        self.put(here)
+            return False
+        here, self._filter = self.index, words.casefold()
+        self._fill(here)
+        return True
 
-    def _keep(self) -> None:
-        count, words = self._listing.count, self._listing.words
-        self._kept = (
-            [index for index in range(count) if self._filter in words(index).casefold()]
-            if self._filter
-            else range(count)
-        )
+    def _fill(self, index: int | None) -> None:
+        count, words, height = self.listing.count, self.listing.words, self.listing.height
+        shown = [i for i in range(count) if not self._filter or self._filter in words(i).casefold()]
+        with self.prevent(OptionList.OptionHighlighted):
+            if (len(shown), height) != (self.option_count, self._height):
+                self._height = height
+                self.set_options(Option(_Lines(height)) for _ in shown)
+            self._shown = shown
+            self.highlighted = None if not shown else shown.index(index) if index in shown else 0
+        self.scroll_to_highlight()
+        self._paint()
 
-    @property
-    def line_count(self) -> int:
-        return len(self._kept) * self._listing.height
+    def _paint(self) -> None:
+        """Have the lines in view painted that are not what was painted last."""
+        before, self._painted = self._painted, {}
+        for row in range(self.size.height):
+            y = self.scroll_offset.y + row
+            line = self._line(y)
+            if y not in before or not before[y].is_same(line):
+                self.refresh_lines(y)
 
-    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        return self.line_count
+    def _line(self, y: int) -> Content:
+        """Line y of the list, cut off at the width; empty below its end."""
+        place, part = divmod(y, self.listing.height)
+        width = self.scrollable_content_region.width - 2
+        if place >= len(self._shown) or width < 1:
+            return Content()
+        line = self.listing.item(self._shown[place], width)[part]
+        if line.cell_length > width:
+            line = line.truncate(width - 1) + self._more
+        if place == self.highlighted and self.has_focus:  # grey on the bar of the cursor is a patch
+            line = Content(line.plain, [span for span in line.spans if span.style != "dim"])
+        return line.pad(1, 1).pad_right(width - line.cell_length)
 
-    def line(self, y: int) -> Content:
-        place, part = divmod(y, self._listing.height)
-        width = self.text_width
-        content = self._listing.item(self._kept[place], width)[part]
-        if content.cell_length > width:
-            content = content.truncate(width - 1) + self._more
-        line = content.pad_left(MARGIN)
-        if place != self._cursor:
-            return line
-        # Reversed, for status colours stay legible and a terminal without colours shows it too; dim is a grey patch.
-        line = Content(line.plain, [span for span in line.spans if span.style != "dim"])
-        return line.pad_right(width + MARGIN - line.cell_length).stylize("bold reverse" if self.has_focus else "bold")
+    def render_line(self, y: int) -> Strip:
+        y += self.scroll_offset.y
+        line, style = self._line(y), self.visual_style
+        self._painted[y] = line
+        place = y // self.listing.height
+        if place == self.highlighted:
+            # Reversed: status colours stay legible, and a terminal without colours shows it too.
+            style += Style(bold=True, reverse=self.has_focus)
+        if not line.plain:
+            return Strip.blank(self.size.width, self.visual_style.rich_style)
+        strip = Visual.to_strips(self, line, line.cell_length, 1, style)[0]
+        return strip.simplify().apply_meta({"option": place})
 
-    def _bring_into_view(self) -> None:
-        height, top = self._listing.height, self.scroll_offset.y
-        first = self._cursor * height
-        width, visible = self.scrollable_content_region.size
-        if visible:
-            self._fit(Size(width, max(self.line_count, visible)))  # before it is known, nothing can be scrolled to
-        # Half a page at a time: every line moves, which a slow link should not pay for at every key.
-        if visible and not top <= first <= top + visible - height:
-            self.scroll_to(y=max(first - visible // (2 * height) * height, 0), animate=False)
+    def on_click(self) -> None:
+        self.clicked_on = self.highlighted
 
     def on_resize(self, event: Resize) -> None:
-        self._bring_into_view()
-        super().on_resize(event)
+        event.prevent_default()  # Textual would paint all of it
+        self.scroll_to_highlight()
+        self._paint()
 
-    def watch_has_focus(self, has_focus: bool) -> None:
-        super().watch_has_focus(has_focus)
-        self.sync()
+    def watch_highlighted(self, before: int | None, highlighted: int | None) -> None:  # type: ignore[override]
+        super().watch_highlighted(highlighted)
+        for place in (before, highlighted):
+            if place is not None:
+                self.refresh_lines(place * self.listing.height, self.listing.height)
 
-    def action_move(self, by: int) -> None:
-        """Move the cursor; it stops at the ends."""
-        before = self._cursor
-        self._cursor = min(max(before + by, 0), max(len(self._kept) - 1, 0))
-        if self._cursor != before:
-            self._bring_into_view()
-            self.sync()
-            self._moved()
+    def scroll_to_highlight(self, top: bool = False) -> None:
+        """Half a page at a time: every line moves then, which a slow link should not pay for at every key."""
+        height, visible = self.listing.height, self.scrollable_content_region.height
+        first = (self.highlighted or 0) * height
+        if visible and not self.scroll_offset.y <= first <= self.scroll_offset.y + visible - height:
+            self.scroll_to(y=max(first - visible // 2, 0), animate=False, immediate=True)
 
-    def action_page_down(self) -> None:
-        self.action_move(self._page())
+    def action_cursor_down(self) -> None:
+        if self.highlighted is not None and self.highlighted < len(self._shown) - 1:
+            super().action_cursor_down()
 
-    def action_page_up(self) -> None:
-        self.action_move(-self._page())
-
-    def _page(self) -> int:
-        return max(self.scrollable_content_region.height // self._listing.height - 1, 1)
-
-    def on_click(self, event: Click) -> None:
-        place = (event.y + self.scroll_offset.y) // self._listing.height
-        if place == self._cursor and self._kept:
-            self.post_message(self.Chosen(self._kept[place]))
-        elif place < len(self._kept):
-            self.action_move(place - self._cursor)
+    def action_cursor_up(self) -> None:
+        if self.highlighted:
+            super().action_cursor_up()

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from rich.text import Text
+from rich.segment import Segment
+from textual.strip import Strip
 from textual.widgets import Input
 
 
 class LineInput(Input):
     """textual's Input draws control characters as they are; here each is drawn as a question mark, and kept."""
 
-    @property
-    def _value(self) -> Text:
-        drawn = "".join(character if character.isprintable() else "?" for character in self.value)
-        return Text(drawn, no_wrap=True, overflow="ignore", end="")
+    def render_line(self, y: int) -> Strip:
+        return Strip(Segment(_printable(text), style) for text, style, _ in super().render_line(y))
+
+
+def _printable(text: str) -> str:
+    return "".join(character if character.isprintable() else "?" for character in text)

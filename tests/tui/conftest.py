@@ -13,8 +13,7 @@ from care_core.application.configuring import DiffSide
 from care_core.diagnose.records import Diagnosis, Fix
 from care_core.variables import Change
 from care_tui.app import CareApp
-from care_tui.jobs import Engine
-from care_tui.screens.panes import PanesScreen
+from care_tui.engine import Engine
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
 
@@ -31,6 +30,16 @@ def _nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monkey
     monkeypatch.setenv("CARE_HISTORY", str(folder / "history.sqlite3"))
     for name in ("NO_COLOR", "TEXTUAL_THEME", "TMUX", "SSH_CONNECTION"):
         monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture(autouse=True)
+def _told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep what the app says in passing, which Textual does not show in tests."""
+
+    def notify(app: CareApp, message: str, **_: object) -> None:
+        app.title = message
+
+    monkeypatch.setattr(CareApp, "notify", notify)
 
 
 def fake_predict(case: Case, changes: Mapping[str, float]) -> Fix:
@@ -103,7 +112,7 @@ async def settle(pilot: Pilot[int], *keys: str) -> None:
 
 async def quiet(pilot: Pilot[int]) -> None:
     """Wait for the workers of every screen, and for what they bring to be shown."""
-    await pilot.app.workers.wait_for_complete()
-    while any(isinstance(screen, PanesScreen) and screen.is_busy for screen in pilot.app.screen_stack):
-        await pilot.pause(0.005)
+    for _ in range(3):  # an answer may lead to another question
+        await pilot.pause()
+        await pilot.app.workers.wait_for_complete()
     await pilot.pause()

@@ -9,11 +9,12 @@ import pytest
 from textual.widgets import Input, Static
 
 from care_core.records import replace
-from care_tui.screens.export import ExportDialog, OverwriteDialog
-from care_tui.screens.walk import WalkScreen
-from care_tui.widgets.lines import Lines
+from care_tui.screens.case import CaseScreen
+from care_tui.screens.confirm import Confirm
+from care_tui.screens.export import ExportDialog
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
+from tests.tui.test_walk import text, title
 
 
 @pytest.fixture(autouse=True)
@@ -38,11 +39,11 @@ async def test_export_writes_the_format_in_view_beside_the_operator(
     app = make_app(sample.faulty())
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot, "6", *formats)
-        assert app.screen.query_one("#text", Lines).plain.startswith(f"report: {shown}")
+        assert text(app).startswith(f"report: {shown}")
         await settle(pilot, "e", "enter")
-        assert isinstance(app.screen, WalkScreen)
+        assert isinstance(app.screen, CaseScreen)
         assert (tmp_path / name).read_text().startswith(f"report: {format}")
-        assert f"written to {name}" in str(app.screen.query_one(".title", Static).content)
+        assert f"written to {name}" in title(app)
 
 
 @pytest.mark.parametrize(("answer", "replaced"), [("y", True), ("n", False), ("escape", False)])
@@ -56,10 +57,10 @@ async def test_an_existing_file_is_replaced_only_when_asked_for(
         await settle(pilot, "6", "e")
         await pilot.press("enter")
         await pilot.pause()
-        assert isinstance(app.screen, OverwriteDialog)
+        assert isinstance(app.screen, Confirm)
         await pilot.press(answer)
         await settle(pilot)
-        assert isinstance(app.screen, WalkScreen if replaced else ExportDialog)
+        assert isinstance(app.screen, CaseScreen if replaced else ExportDialog)
     assert (target.read_text() != "precious") is replaced
 
 
@@ -76,7 +77,7 @@ async def test_another_name_can_be_given_and_a_wrong_one_is_explained(make_app: 
         assert "No such file" in str(app.screen.query_one(".error", Static).content)
         box.value = "mine.json"
         await settle(pilot, "enter")
-        assert isinstance(app.screen, WalkScreen)
+        assert isinstance(app.screen, CaseScreen)
     assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["mine.json"]
 
 
@@ -84,7 +85,7 @@ async def test_escape_leaves_without_writing(make_app: MakeApp, tmp_path: Path) 
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "6", "e", "escape")
-        assert isinstance(app.screen, WalkScreen)
+        assert isinstance(app.screen, CaseScreen)
     assert not [path for path in tmp_path.iterdir() if path.is_file()]
 
 

@@ -17,7 +17,7 @@ from care_tui.app import CareApp
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, fake_engine, settle
-from tests.tui.test_walk import hints, items, text, title
+from tests.tui.test_walk import items, text, title
 
 
 def run_of(number: int, mission_time: float, land_speed: float) -> Diagnosis:
@@ -55,7 +55,7 @@ async def test_a_history_that_cannot_be_used_costs_a_sentence(tmp_path: Path, mo
     app = remembering_app()
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
-        assert "The history cannot be used" in hints(app)
+        assert "The history cannot be used" in app.title
         assert "mission_time" in items(app), "the diagnosis is there all the same"
         await settle(pilot, "y")
         assert "The history cannot be used" in text(app)
@@ -75,14 +75,14 @@ async def test_past_runs_show_trends_and_two_are_compared() -> None:
     app = remembering_app()
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "y")
-        assert title(app).startswith("History  3 runs")
+        assert title(app).startswith("3 runs")
         assert [line.split()[2] for line in items(app).splitlines()] == [
             "00000042.BIN", "00000002.BIN", "00000001.BIN",
         ]  # fmt: skip
         assert "mission_time" in text(app)
         assert "▁▂█  140 to 187" in text(app)
         await settle(pilot, "x", "j", "j")
-        assert "against 00000042.BIN" in title(app)
+        assert "Compared with 00000042.BIN" in title(app)
         times, speeds = (
             next(line.split() for line in text(app).splitlines() if line.startswith(name))
             for name in ("mission_time", "LAND_SPEED")
@@ -91,7 +91,7 @@ async def test_past_runs_show_trends_and_two_are_compared() -> None:
         assert speeds[1:] == ["50", "16"]
         assert "WPNAV_SPEED" not in text(app), "options that are alike are left out"
         await settle(pilot, "k", "k", "x")
-        assert title(app).startswith("History  3 runs"), "x on the marked run takes the mark away"
+        assert title(app).startswith("3 runs"), "x on the marked run takes the mark away"
 
 
 async def test_enter_puts_a_run_and_the_marked_one_side_by_side_in_full() -> None:
@@ -109,7 +109,7 @@ async def test_enter_puts_a_run_and_the_marked_one_side_by_side_in_full() -> Non
     app = CareApp(Request(LOG), engine=replace(engine, remember=remember_triage), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "y", "j", "x", "k")
-        assert "Both in full" in hints(app)
+        assert "both in full" in title(app)
         await settle(pilot, "enter")
         assert [one.log.name for one in asked[0]] == ["00000002.BIN", "00000042.BIN"], "the marked one is A"
         assert "at 2.6 s throttle goes apart" in text(app)

@@ -12,9 +12,9 @@ from textual.pilot import Pilot
 from textual.screen import ModalScreen
 
 from care_tui.app import CareApp
-from care_tui.screens.base import CareScreen
-from care_tui.screens.panes import PanesScreen
-from care_tui.screens.walk import WalkScreen
+from care_tui.page_names import NAMES
+from care_tui.pages.making import page_classes
+from care_tui.screens.case import CaseScreen
 from care_tui.settings import Settings
 from care_tui.widgets.choices import Choices
 from care_tui.widgets.filter_bar import FilterBar
@@ -22,7 +22,7 @@ from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, quiet, settle
 
 LEADS_OUT = {"q", "ctrl+c"}
-VIEWS = ("w", "m", "p", "y", "b", "v")
+VIEWS = ("w", "m", "p", "y", "b", "v", "M", "L")
 STEPS = ("1", "2", "3", "4", "5", "6")
 APP_MD = Path(__file__).parents[2] / "docs" / "app.md"
 
@@ -33,9 +33,9 @@ def keys_of(*bindings: Iterable[BindingType]) -> list[str]:
     return [key for key in dict.fromkeys(keys) if key not in LEADS_OUT]
 
 
-HERE = (CareApp.BINDINGS, PanesScreen.BINDINGS)
-DOES = [binding for binding in WalkScreen.BINDINGS if isinstance(binding, Binding) and binding.action.startswith("do(")]
-"""What the keys of single steps do; on every other step they have to do nothing."""
+HERE = (CareApp.BINDINGS, CaseScreen.BINDINGS)
+DOES = [binding for page in page_classes() for binding in page.BINDINGS]
+"""What the keys of single pages do; on every other page they have to do nothing."""
 
 
 async def leave_dialogs(pilot: Pilot[int]) -> None:
@@ -53,9 +53,9 @@ async def test_no_key_fails_on_a_step(make_app: MakeApp, step: str, verdict: str
         for key in keys_of(*HERE, DOES):
             await pilot.press(key)
             await leave_dialogs(pilot)
-            assert isinstance(app.screen, WalkScreen), key
+            assert isinstance(app.screen, CaseScreen), key
             await pilot.press(step)
-            assert app.screen.step == int(step)
+            assert app.screen.here == NAMES[int(step) - 1]
         await quiet(pilot)
         await settle(pilot, "q")
     assert app.return_value is not None
@@ -65,7 +65,7 @@ async def test_no_key_fails_on_a_step(make_app: MakeApp, step: str, verdict: str
 async def test_no_key_fails_on_a_view(make_app: MakeApp, view: str) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        for key in keys_of(*HERE, CareScreen.BINDINGS, DOES, Choices.BINDINGS):
+        for key in keys_of(*HERE, DOES, Choices.BINDINGS):
             await leave_dialogs(pilot)
             await settle(pilot, view)
             await pilot.press(key)
@@ -79,20 +79,19 @@ async def test_no_key_fails_without_a_log(step: str) -> None:
     app = CareApp(settings=Settings(places=()))
     async with app.run_test(size=(60, 20)) as pilot:
         await settle(pilot, step)
-        for key in keys_of(WalkScreen.BINDINGS):
+        for key in keys_of(CaseScreen.BINDINGS):
             await pilot.press(key)
             await leave_dialogs(pilot)
-            assert isinstance(app.screen, WalkScreen), key
+            assert isinstance(app.screen, CaseScreen), key
             await pilot.press(step)
 
 
 def test_the_documentation_names_every_key_of_the_walk_and_the_views() -> None:
     table = APP_MD.read_text(encoding="utf-8")
     written = set(re.findall(r"`([^`]+)`", table)) | set(re.findall(r"F\d", table))
-    signs = {"plus": "+", "minus": "-", "equals_sign": "="}
-    for binding in WalkScreen.BINDINGS:
+    signs = {"plus": "+", "minus": "-", "equals_sign": "=", "slash": "/"}
+    for binding in (*CaseScreen.BINDINGS, *DOES):
         assert isinstance(binding, Binding)
         names = [signs.get(key, key.upper() if re.fullmatch(r"f\d", key) else key) for key in binding.key.split(",")]
-        assert written & {*names} or {"space", "left", "right"} & {*names} or str(binding.id).startswith("step."), (
-            binding
-        )
+        named = written & {*names} or {"space", "left", "right", "enter", "escape", "tab", "shift+tab"} & {*names}
+        assert named or str(binding.id).startswith("step."), binding

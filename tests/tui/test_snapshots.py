@@ -13,7 +13,7 @@ from care_core.errors import LogError
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
 
-SIZES = [(80, 24), (120, 40)]
+SIZES = {"60x20": (60, 20), "80x24": (80, 24), "120x40": (120, 40), "170x45": (170, 45)}
 SnapCompare = Callable[..., bool]
 
 pytestmark = pytest.mark.skipif(sys.version_info[:2] != (3, 11), reason="snapshots are made on Python 3.11 only")
@@ -26,7 +26,7 @@ def press(*keys: str) -> Callable[[Pilot[Any]], Awaitable[None]]:
     return walk
 
 
-@pytest.mark.parametrize("size", SIZES, ids=["80x24", "120x40"])
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
 @pytest.mark.parametrize(
     "keys",
     [("1",), ("2",), ("3",), ("4", "j"), ("5",), ("6",)],
@@ -42,7 +42,7 @@ def test_other_verdicts(snap_compare: SnapCompare, make_app: MakeApp, kind: str)
     assert snap_compare(make_app(diagnosis), terminal_size=(80, 24), run_before=press())
 
 
-@pytest.mark.parametrize("size", SIZES, ids=["80x24", "120x40"])
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
 @pytest.mark.parametrize(("kind", "step"), [("crashed", "1"), ("crashed", "3"), ("unfitting", "1")])
 def test_what_happened(
     snap_compare: SnapCompare, make_app: MakeApp, kind: str, step: str, size: tuple[int, int]

@@ -12,13 +12,14 @@ from textual import events
 from care_core.application.case import Case, Progress, Request
 from care_core.errors import CareError, ExitCode, LogError, ProfileError
 from care_tui.app import CareApp
-from care_tui.jobs import Engine, Job
+from care_tui.engine import Engine
 from care_tui.places import as_path, entries, found_logs, recent_logs, remember
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.settings import Settings
+from care_tui.threads import DaemonThreads
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, MakeApp, fake_engine, fake_predict, fake_report, settle
-from tests.tui.test_walk import hints, items, text, title, walk
+from tests.tui.test_walk import answer, items, step_of, text, title, walk
 
 
 class SlowEngine:
@@ -47,15 +48,15 @@ async def test_loading_shows_step_and_share_done_on_every_step() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         slow.reached.wait(5)
         await pilot.pause(0.1)
-        assert r"reading \x1b[31m[red]the log" in text(app)
-        assert "25 %" in text(app)
+        assert r"reading \x1b[31m[red]the log" in answer(app)
+        assert "25 %" in answer(app)
         for step in "23456":
             await pilot.press(step)
             await pilot.pause()
-            assert "25 %" in text(app)
+            assert "25 %" in answer(app)
         slow.go_on.set()
         await settle(pilot)
-        assert walk(app).step == 6, "the operator is left where they are"
+        assert step_of(app) == 6, "the operator is left where they are"
         assert text(app).startswith("report: yaml")
 
 
@@ -71,7 +72,7 @@ async def test_escape_stops_work_that_never_reports_and_r_starts_again() -> None
         assert "was stopped" in text(app), "a late answer is ignored"
         await settle(pilot, "r")
         await settle(pilot)
-        assert walk(app).step == 2
+        assert step_of(app) == 2
         assert app.code == ExitCode.FAULT
 
 
@@ -88,14 +89,17 @@ async def test_enter_while_reading_does_not_start_the_reading_again(tmp_path: Pa
     async with app.run_test(size=(80, 24)) as pilot:
         slow.reached.wait(5)
         await pilot.pause(0.1)
+        await pilot.press("L")
+        await pilot.pause(0.3)
         assert "a.BIN" in items(app)
         await pilot.press("enter", "enter")
         await pilot.pause(0.1)
-        assert "25 %" in text(app), "it goes on where it was"
-        assert "being read" in hints(app)
+        assert "25 %" in answer(app), "it goes on where it was"
+        assert "being read" in app.title
         slow.go_on.set()
         await settle(pilot)
-        assert walk(app).step == 2
+        assert walk(app).session.state == "data"
+        assert walk(app).here == "logs", "the operator is left where they are"
     assert asked == [log]
 
 
@@ -157,16 +161,16 @@ async def test_without_a_log_the_first_step_lists_what_there_is(make_app: MakeAp
     )
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert walk(app).step == 1
+        assert walk(app).here == "logs"
         assert "old.BIN" in items(app)
         await settle(pilot, "3")
         assert "No log is open" in text(app)
         (tmp_path / "new.BIN").write_bytes(b"xy")
-        await settle(pilot, "1", "R")
+        await settle(pilot, "L", "R")
         assert "new.BIN" in items(app)
         await settle(pilot, "enter")
         await settle(pilot)
-        assert walk(app).step == 2
+        assert step_of(app) == 2
     assert recent_logs()[0].name in ("old.BIN", "new.BIN")
 
 
@@ -199,7 +203,7 @@ async def test_o_opens_any_log_by_its_path(make_app: MakeApp, tmp_path: Path) ->
         await settle(pilot, "enter")
         assert "no such file" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
         await settle(pilot, "escape")
-        assert walk(app).step == 1
+        assert walk(app).here == "logs"
 
 
 async def test_a_file_dropped_on_the_terminal_is_opened(make_app: MakeApp, tmp_path: Path) -> None:
@@ -258,28 +262,42 @@ def test_recordings_are_one_log_each_wherever_the_operator_keeps_them(
     assert {log.path.name for log in found_logs([tmp_path / "bags"])} == {"monday", "stray.BIN"}
 
 
-def test_a_job_that_is_cancelled_ends_at_its_next_check_and_its_answer_is_dropped() -> None:
+async def test_a_thread_that_was_left_ends_at_its_next_report_and_its_answer_is_dropped(make_app: MakeApp) -> None:
     ended: list[str] = []
     started, go_on, over = threading.Event(), threading.Event(), threading.Event()
 
-    def work(job: Job) -> None:
+    def diagnose(_request: Request, progress: Progress) -> Case:
         started.set()
         go_on.wait(5)
         try:
-            job.check()
+            progress("on", 0.5)
         except Exception:  # as a reader that takes every error for damage
             ended.append("swallowed")
         finally:
             over.set()
         ended.append("went on")
+        return Case(sample.faulty(), sample.OPTIONS)
 
-    job = Job()
-    job.start(work, lambda _answer: ended.append("answered"))
-    started.wait(5)
-    job.cancelled = True
-    go_on.set()
-    assert over.wait(5)
-    assert ended == []
+    app = CareApp(Request(LOG), engine=fake_engine(diagnose), settings=Settings(places=()))
+    async with app.run_test(size=(80, 24)) as pilot:
+        started.wait(5)
+        await pilot.press("escape")
+        go_on.set()
+        assert over.wait(5)
+        await settle(pilot)
+        assert ended == []
+        assert "was stopped" in text(app)
+
+
+def test_threads_are_not_waited_for_and_tell_what_went_wrong() -> None:
+    let_go = threading.Event()
+    threads = DaemonThreads()
+    held = threads.submit(let_go.wait, 30)
+    with pytest.raises(ZeroDivisionError):
+        threads.submit(lambda: 1 // 0).result(5)
+    threads.shutdown()
+    assert not held.done()
+    let_go.set()
 
 
 async def test_copying_sends_osc_52_and_leaves_a_file(make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -288,10 +306,10 @@ async def test_copying_sends_osc_52_and_leaves_a_file(make_app: MakeApp, monkeyp
     monkeypatch.setattr(app, "write_control", sent.append)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot, "6", "c")
-        name = hints(app).rsplit(" ", 1)[1]
+        name = app.title.rsplit(" ", 1)[1]
         assert Path(name).read_text() == "param set LAND_SPEED 50\n"
         Path(name).unlink()
         await settle(pilot, "5", "c")
-        Path(hints(app).rsplit(" ", 1)[1]).unlink()
+        Path(app.title.rsplit(" ", 1)[1]).unlink()
     assert len(sent) == 2
     assert sent[0].startswith("\x1b]52;c;")

@@ -19,9 +19,9 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a POSIX t
 
 CODE = "from care_tui.cli import main; main()"
 CRASH = """
-from care_tui.screens.walk import WalkScreen
-def crash(self, step): raise RuntimeError("made to fail")
-WalkScreen.action_go = crash
+from care_tui.screens.case import CaseScreen
+async def crash(self, *_): raise RuntimeError("made to fail")
+CaseScreen._go = crash
 from care_tui.cli import main
 main()
 """
@@ -89,7 +89,7 @@ def test_from_start_to_the_exported_report(tmp_path: Path, sample: str) -> None:
     terminal.expect("Objectives")
     terminal.expect("mission_time")  # diagnosed, at the first fault
     terminal.press("\r", "LAND_SPEED")  # its causes
-    terminal.press("\r", "Probability of no fault")  # the fix
+    terminal.press("\r", "What to change")  # the fix
     terminal.press("\r", "+++ suggested")  # the diff
     terminal.press("\r", "care.triage/1")  # the report
     terminal.press("\r", "Write the report to")
@@ -141,7 +141,7 @@ def test_a_terminal_without_the_signs_gets_ascii_and_no_escapes_in_their_place(
     named.write_bytes(Path(sample).read_bytes())
     terminal = Terminal(tmp_path, str(named), **variables)
     terminal.expect("x FAULT")
-    terminal.press("1", ">1 Log")
+    terminal.press("1", "What happened")
     terminal.child.send("q")
     assert terminal.end() == 1
     assert b"\\u" not in terminal.seen

@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from textual.widgets import Static
+from textual.widgets import Input, Static, Tabs
 
 from care_core.application.case import Case, Request
 from care_core.errors import UsageError
@@ -15,13 +15,13 @@ from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.pages.history import HistoryPage
 from care_tui.render.plot import dots_across, plot
-from care_tui.screens.walk import WalkScreen
+from care_tui.screens.case import CaseScreen
+from care_tui.screens.confirm import Confirm
 from care_tui.settings import Settings
-from care_tui.widgets.choices import Choices
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
-from tests.tui.test_walk import hints, items, text, title, walk
+from tests.tui.test_walk import index, items, step_of, text, title, walk
 
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
 needs_sample = pytest.mark.skipif(not SAMPLE.is_file(), reason="the sample is not bundled")
@@ -36,18 +36,18 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
     app = real()
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "w")
-        assert title(app).startswith("Around mission_time")
+        assert title(app).startswith("Around mission_time:")
         first = items(app).splitlines()[0]
         await settle(pilot, "enter")
-        assert f"Around {first.split()[2]}" in title(app)
+        assert f"Around {first.split()[2]}:" in title(app)
         await settle(pilot, "h")
-        assert title(app).startswith("Around mission_time")
+        assert title(app).startswith("Around mission_time:")
         await settle(pilot, "escape", "m")
         assert "ArduCopter V4.5.4" in items(app)
-        choices = app.screen.query_one("#list", Choices)
+        choices = walk(app).page.choices
         assert choices.has_focus, "the list takes the focus when it appears"
-        assert choices.highlighted is not None
-        assert choices.highlighted > 1000
+        assert choices.index is not None
+        assert choices.index > 1000
         assert choices.scroll_offset.y > 0, "the moment of failure is in view"
         await settle(pilot, "n", "slash", *"arming")
         assert "arming" in items(app).casefold()
@@ -62,13 +62,13 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         assert "FAULT: mission_time" in items(app)
         assert "LAND_SPEED" in text(app)
         await settle(pilot, "x", "x", "escape")
-        assert isinstance(app.screen, WalkScreen)
+        assert isinstance(app.screen, CaseScreen)
         await settle(pilot, "v")
         assert "Parameters  1002" in text(app)
         await settle(pilot, "3", "f2")
         assert title(app).startswith("Around LAND_SPEED"), "the graph starts at the cause under the cursor"
         await settle(pilot, "1", "question_mark", "escape", "escape")
-        assert isinstance(app.screen, WalkScreen)
+        assert isinstance(app.screen, CaseScreen)
 
 
 @needs_sample
@@ -93,18 +93,18 @@ async def test_a_message_leads_to_its_moment_in_the_plots_where_what_was_wanted_
         await settle(pilot, "m", "slash", *"4 WP", "enter")
         assert "62.8 s" in items(app)
         await settle(pilot, "enter")
-        assert walk(app).page.name == "Signals"
-        assert title(app) == "Signals from 30.5 s to 195.2 s  at 62.8 s"
+        assert walk(app).here == "plots"
+        assert title(app) == "30.5 s to 195.2 s, at 62.8 s"
         assert "to follow D" in items(app).splitlines()[0]
         assert "(wanted)" in text(app)
         column = {line.index("│") for line in text(app).splitlines() if "│" in line}
         assert len(column) == 1, "the moment is a line from top to bottom"
         await settle(pilot, "plus", "plus")
-        assert title(app) == "Signals from 42.2 s to 83.4 s  at 62.8 s"
+        assert title(app) == "42.2 s to 83.4 s, at 62.8 s"
         await settle(pilot, "minus", "minus", "minus")
-        assert title(app) == "Signals from 0.0 s to 195.6 s  at 62.8 s", "never more than the log holds"
+        assert title(app) == "0.0 s to 195.6 s, at 62.8 s", "never more than the log holds"
         await settle(pilot, "v", "m")
-        assert items(app).splitlines()[walk(app).choices.highlighted or 0].split()[0] == "62.8"
+        assert items(app).splitlines()[index(app) or 0].split()[0] == "62.8"
         await settle(pilot, "k", "p")
         assert "at 62." in title(app)
 
@@ -113,16 +113,21 @@ async def test_what_happened_is_marked_on_the_axis_of_time_and_n_goes_from_mark_
     marked = Case(sample.crashed(), log=MadeLog({"ATT": {"Roll": T, "DesRoll": T}}))
     app = CareApp(Request(LOG), engine=fake_engine(lambda *_: marked), settings=Settings(places=()))
     async with app.run_test(size=(80, 40)) as pilot:
-        await settle(pilot, "p")
+        await settle(pilot, "m", "p")
         lines = text(app).splitlines()
-        axis = next(place for place, line in enumerate(lines) if "12.4 s" in line and "199.7 s" in line)
+        axis = next(place for place, line in enumerate(lines) if "60" in line and "180 s" in line)
         assert {"A", "M", "E", "✗"} <= set(lines[axis - 1])
         assert any("motor 2 lost thrust" in line for line in lines[axis:])
+        await settle(pilot, "plus", "plus")
+        span = title(app).split(",")[0]
+        width = float(span.split()[3]) - float(span.split()[0])
         await settle(pilot, "n")
         first = title(app)
         await settle(pilot, "n", "n")
         assert title(app) != first
-        assert "  at " in title(app)
+        assert ", at " in title(app)
+        start, end = (float(title(app).split()[place]) for place in (0, 3))
+        assert end - start == pytest.approx(width, abs=0.2), "n keeps the zoom"
         await settle(pilot, "1", "p")
         assert title(app).endswith("at 91.3 s"), "p on a finding leads to its onset"
     quiet_run = replace(sample.RUN, evidence=())
@@ -130,7 +135,7 @@ async def test_what_happened_is_marked_on_the_axis_of_time_and_n_goes_from_mark_
     app = CareApp(Request(LOG), engine=fake_engine(lambda *_: unmarked), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "p", "n")
-        assert "Nothing is marked" in hints(app)
+        assert "Nothing is marked" in app.title
 
 
 @needs_sample
@@ -167,23 +172,73 @@ async def test_the_file_on_disk_is_patched_with_its_comments_kept(tmp_path: Path
 
 
 @needs_sample
+async def test_the_change_is_put_into_the_file_that_is_asked_for_and_the_old_one_is_kept(tmp_path: Path) -> None:
+    file = tmp_path / "robot.param"
+    before = "# landing, agreed with Anna\nLAND_SPEED,16  # slow\nWPNAV_SPEED,1000\n"
+    file.write_text(before)
+    app = real()
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "5", "A")
+        app.screen.query_one(Input).value = str(tmp_path / "none.param")
+        await settle(pilot, "enter")
+        assert "no such file" in str(app.screen.query_one(".error", Static).content)
+        app.screen.query_one(Input).value = str(file)
+        await settle(pilot, "enter")
+        assert "+LAND_SPEED,40  # slow" in text(app)
+        await settle(pilot, "A")
+        assert isinstance(app.screen, Confirm)
+        await settle(pilot, "n")
+        assert file.read_text() == before, "nothing is written unasked"
+        await settle(pilot, "A", "y")
+        assert "the old one is robot.param.bak" in app.title
+    assert file.read_text() == before.replace("16", "40")
+    assert (tmp_path / "robot.param.bak").read_text() == before
+
+
+@needs_sample
+async def test_a_folder_lists_its_logs_with_verdicts_and_enter_opens_one(tmp_path: Path) -> None:
+    (tmp_path / "flight.BIN").write_bytes(SAMPLE.read_bytes())
+    (tmp_path / "broken.BIN").write_bytes(b"x" * 100)
+    app = CareApp(Request(tmp_path, top=10), settings=Settings(places=()))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot)
+        assert walk(app).here == "logs"
+        told = {line.split()[-1] if "UNREADABLE" in line else "flight": line for line in items(app).splitlines()}
+        assert any("FAULT" in line and "mission_time" in line for line in told.values())
+        assert any("UNREADABLE" in line for line in told.values())
+        await settle(pilot, "slash", *"flight", "enter", "enter")
+        await settle(pilot)
+        assert walk(app).here == "objectives"
+
+
+@needs_sample
+async def test_the_map_shows_the_track_and_the_corners_that_were_asked_for() -> None:
+    app = real()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "M")
+        assert title(app) == "Track and the way asked for"
+        assert text(app).count("o") >= 5
+        assert any("\u2800" < sign <= "\u28ff" for sign in text(app))
+
+
+@needs_sample
 async def test_one_key_leads_from_any_view_to_any_other_and_digits_leave_it() -> None:
     app = real()
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
-        for key, name in (("m", "Messages"), ("p", "Signals"), ("y", "History"), ("w", "Graph"), ("v", "Contents")):
+        for key, name in (("m", "Messages"), ("p", "plots"), ("y", "History"), ("w", "Graph"), ("v", "Contents")):
             await settle(pilot, key, key)
-            assert walk(app).page.name == name
-            assert f"▸{name} " in str(app.screen.query_one("StepBar").content)  # type: ignore[attr-defined]
-            assert "▸3" not in str(app.screen.query_one("StepBar").content)  # type: ignore[attr-defined]
+            assert walk(app).here == name.lower()
+            assert walk(app).query_one("#view-tabs", Tabs).active == name.lower()
+            assert not walk(app).query_one("#step-tabs", Tabs).active
         await settle(pilot, "escape", "escape")
-        assert walk(app).page.name == "History", "Esc leads back the way the operator came"
+        assert walk(app).here == "history", "Esc leads back the way the operator came"
         for digit, name in (("3", "Causes"), ("5", "Diff")):
             await settle(pilot, digit)
-            assert walk(app).page.name == name
+            assert walk(app).here == name.lower()
             await settle(pilot, "b")
         await settle(pilot, "escape")
-        assert walk(app).step == 5
+        assert step_of(app) == 5
 
 
 @needs_sample
@@ -191,10 +246,10 @@ async def test_a_view_keeps_its_place_while_another_is_looked_at() -> None:
     app = real()
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "m", "k", "k", "k")
-        here = walk(app).choices.highlighted
+        here = index(app)
         await settle(pilot, "v", "escape")
-        assert walk(app).page.name == "Messages"
-        assert walk(app).choices.highlighted == here
+        assert walk(app).here == "messages"
+        assert index(app) == here
 
 
 async def test_views_of_a_log_need_one_and_the_others_do_not(make_app: MakeApp) -> None:
@@ -202,7 +257,7 @@ async def test_views_of_a_log_need_one_and_the_others_do_not(make_app: MakeApp) 
     async with app.run_test(size=(80, 24)) as pilot:
         for key in ("f2", "f3", "f4"):
             await settle(pilot, key)
-            assert "Open a log first" in hints(app)
+            assert "Open a log first" in app.title
         await settle(pilot, "f5")
         assert isinstance(walk(app).page, HistoryPage)
         assert "No run was triaged before" in text(app)
@@ -216,12 +271,13 @@ async def test_a_log_that_is_cut_off_before_its_mission_tells_what_is_there(tmp_
     app = CareApp(Request(log), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert walk(app).step == 1
+        assert step_of(app) == 1
         assert "What would make one fit" in text(app)
+        await settle(pilot, "z")
         assert "breaks off inside a record" in text(app)
-        for key, name in (("m", "Messages"), ("p", "Signals"), ("t", "Missions")):
+        for key, name in (("m", "messages"), ("p", "plots"), ("t", "missions")):
             await settle(pilot, key)
-            assert walk(app).page.name == name
+            assert walk(app).here == name.lower()
         assert "no mission is judged" in text(app)
         await settle(pilot, "v")
         assert "Format      dataflash-bin" in text(app)
@@ -242,7 +298,7 @@ async def test_a_log_whose_diagnosis_failed_can_still_be_looked_into(tmp_path: P
         assert "There is no mission 9." in text(app)
         assert "v shows what the log holds" in text(app)
         await settle(pilot, "m")
-        assert "no diagnosis" in hints(app)
+        assert "no diagnosis" in app.title
         await settle(pilot, "v")
         assert "Format      dataflash-bin" in text(app)
 
@@ -254,7 +310,6 @@ async def test_a_view_that_cannot_read_the_log_says_so(make_app: MakeApp) -> Non
         assert "no log to look into" in text(app)
         await settle(pilot, "escape", "w")
         assert "no model of this" in text(app)
-        assert app.screen.query_one(".title", Static).display
 
 
 def test_a_plot_is_as_wide_and_as_high_as_asked_for() -> None:

@@ -2,88 +2,121 @@
 
 from __future__ import annotations
 
+import html
+import re
 from pathlib import Path
 
 import pytest
+from textual.dom import DOMNode
+from textual.widget import Widget
+from textual.widgets import Tabs
 
 from care_core.diagnose.records import Circumstance, Diagnosis, Fault
 from care_core.errors import ExitCode
 from care_core.records import replace
 from care_tui.app import CareApp
-from care_tui.screens.export import ExportDialog, OverwriteDialog
+from care_tui.page_names import NAMES
+from care_tui.pages.making import page_classes
+from care_tui.screens.case import CaseScreen
+from care_tui.screens.confirm import Confirm
+from care_tui.screens.export import ExportDialog
 from care_tui.screens.help import HelpScreen
 from care_tui.screens.open_log import OpenLogDialog
-from care_tui.screens.panes import PanesScreen
 from care_tui.screens.prompt import Prompt
-from care_tui.screens.walk import WalkScreen
 from care_tui.settings import Settings
+from care_tui.widgets.answer_bar import AnswerBar
 from care_tui.widgets.choices import Choices
 from care_tui.widgets.filter_bar import FilterBar
-from care_tui.widgets.lines import Lines
+from care_tui.widgets.reader import Reader
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
 
 
-def walk(app: CareApp) -> WalkScreen:
-    assert isinstance(app.screen, WalkScreen)
+def walk(app: CareApp) -> CaseScreen:
+    assert isinstance(app.screen, CaseScreen)
     return app.screen
 
 
+def step_of(app: CareApp) -> int:
+    """The step in view, 0 for a view beside them."""
+    here = walk(app).here
+    return NAMES.index(here) + 1 if here in NAMES else 0
+
+
+def index(app: CareApp) -> int | None:
+    return walk(app).page.choices.index
+
+
 def title(app: CareApp) -> str:
-    return str(app.screen.query_one(".title").content)  # type: ignore[attr-defined]
+    return walk(app).page.title
 
 
 def text(app: CareApp) -> str:
-    return app.screen.query_one("#text", Lines).plain
+    return walk(app).page.reader.plain
 
 
 def items(app: CareApp) -> str:
-    return app.screen.query_one("#list", Choices).plain
+    choices = walk(app).page.choices
+    return choices.plain if choices.display else ""
+
+
+def answer(app: CareApp) -> str:
+    """What is pinned under the tabs."""
+    return str(walk(app).query_one(AnswerBar).content)
 
 
 def hints(app: CareApp) -> str:
-    return str(app.screen.query_one("KeyHints").content)  # type: ignore[attr-defined]
+    """The keys in the last line, and what was said in passing."""
+    keys = [f"{key.key_display} {key.description}" for key in app.screen.query("FooterKey") if key.display]  # type: ignore[attr-defined]
+    return "\n".join([" ".join(keys), app.title])
+
+
+def shown(app: CareApp) -> str:
+    """The whole screen as text."""
+    picture = re.sub(r"<style>.*?</style>", "", app.export_screenshot(simplify=True), flags=re.S)
+    return html.unescape(re.sub(r"<[^>]*>", "", picture)).replace("\xa0", " ")
 
 
 async def test_enter_leads_from_the_objective_to_the_export(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert walk(app).step == 2
-        assert walk(app).choices.highlighted == 1, "starts at the first fault"
+        assert step_of(app) == 2
+        assert index(app) == 1, "starts at the first fault"
         visited = []
         for _ in range(4):
             await settle(pilot, "enter")
-            visited.append(walk(app).step)
+            visited.append(step_of(app))
         assert visited == [3, 4, 5, 6]
         await settle(pilot, "enter")
         assert isinstance(app.screen, ExportDialog)
         await settle(pilot, "escape", "escape", "escape")
-        assert walk(app).step == 4
+        assert step_of(app) == 4
 
 
 async def test_digits_and_sideways_keys_move_between_steps(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "5")
-        assert walk(app).step == 5
+        assert step_of(app) == 5
         await settle(pilot, "h", "left")
-        assert walk(app).step == 3
+        assert step_of(app) == 3
         await settle(pilot, "l", "right", "right", "right", "right")
-        assert walk(app).step == 6
+        assert step_of(app) == 6
         for number in range(1, 7):
             await settle(pilot, str(number))
-            assert walk(app).step == number
-            assert f"▸{number} " in str(app.screen.query_one("StepBar").content)  # type: ignore[attr-defined]
+            assert step_of(app) == number
+            assert walk(app).query_one("#step-tabs", Tabs).active == NAMES[number - 1]
 
 
 async def test_the_objectives_tell_all_three_states_and_where_the_run_came_from(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(120, 40)) as pilot:
-        await settle(pilot)
+        await settle(pilot, "z")
         for fact in ("00000042.BIN", "1 of 2", "arducopter 1.0", "31 of 31", "4.3.6", "byte 1048576", "Land: slow"):
             assert fact in text(app)
-        assert "FAULT  mission_time 187.2 s, wanted <= 150 s; energy 11.3 Wh" in title(app)
+        assert "FAULT  mission_time 187.2 s, wanted <= 150 s; energy 11.3 Wh" in answer(app)
+        assert title(app) == "Objectives: 2 outside, 1 within, 1 not evaluated"
         for line in ("✓ OK", "✗ FAULT          mission_time", "? NOT EVALUATED  path_error"):
             assert line in items(app)
         await settle(pilot, "G")
@@ -95,6 +128,8 @@ async def test_the_path_follows_the_highlighted_cause(make_app: MakeApp) -> None
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
         assert "LAND_SPEED    16 cm/s  (expected 50)" in text(app)
+        assert "resamples" not in text(app), "statistics are behind a key"
+        await settle(pilot, "z")
         assert "effect -0.81 sd, in 97 % of resamples" in text(app)
         assert "outside the training support" in text(app)
         assert "Runner-up     WPNAV_SPEED, lowers the odds by 6 points" in text(app)
@@ -111,10 +146,10 @@ async def test_o_shows_the_causes_of_the_next_fault(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3", "o")
-        assert walk(app).choices.option_count == 1
-        assert "Causes of energy  (2 of 2 faults" in title(app)
+        assert walk(app).page.choices.option_count == 1
+        assert "Causes of energy (2 of 2 faults" in title(app)
         await settle(pilot, "o")
-        assert walk(app).choices.option_count == 3
+        assert walk(app).page.choices.option_count == 3
 
 
 async def test_a_cause_set_aside_leaves_the_fix_and_its_reason_is_in_the_report(make_app: MakeApp) -> None:
@@ -148,14 +183,15 @@ async def test_the_boxes_decide_the_probability_and_what_diff_and_report_hold(ma
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4")
-        assert "91 %  (as driven 2 %)  1 change" in title(app)
+        assert "Change   █████████░  91 %  LAND_SPEED 16 → 50 cm/s  without 2 %" in answer(app)
+        assert title(app) == "What to change: 1 change ticked"
         assert "[x] LAND_SPEED   16 → 50 cm/s" in items(app)
         assert "[ ] WPNAV_SPEED  1000 → 1400 cm/s" in items(app)
         await settle(pilot, "space")
         assert "nothing ticked" in title(app)
         assert "[ ] LAND_SPEED" in items(app)
         await settle(pilot, "j", "space")
-        assert "45 %" in title(app)
+        assert "45 %  WPNAV_SPEED" in answer(app)
         assert "! reboot" in items(app)
         await settle(pilot, "5")
         assert text(app).startswith("--- driven\n+++ suggested\n-WPNAV_SPEED 1000\n+WPNAV_SPEED 1400\n")
@@ -188,33 +224,42 @@ async def test_a_and_s_load_the_alternatives_and_the_suggestion(make_app: MakeAp
         assert walk(app).session.basket.ticked == {"LAND_SPEED": 50.0}
 
 
-async def test_values_are_nudged_and_typed_and_only_acceptable_ones_taken(make_app: MakeApp) -> None:
+async def test_values_are_nudged_and_typed_as_whatif_takes_them_and_only_acceptable_ones_advised(
+    make_app: MakeApp,
+) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4", "minus")
         assert walk(app).session.basket.ticked["LAND_SPEED"] < 50
         await settle(pilot, "plus", "plus")
         assert walk(app).session.basket.ticked["LAND_SPEED"] > 50
-        await settle(pilot, "equals_sign", "9", "9", "9", "enter")
-        assert isinstance(app.screen, Prompt), "999 is beyond the range"
+        await settle(pilot, "equals_sign", "x", "enter")
+        assert isinstance(app.screen, Prompt)
         assert "from 30 to 200 cm/s" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
-        await settle(pilot, "backspace", "enter")
-        assert walk(app).session.basket.ticked["LAND_SPEED"] == 99
-        await settle(pilot, "i", "escape")
-        assert walk(app).session.basket.ticked["LAND_SPEED"] == 99
+        await settle(pilot, "backspace", *"999", "enter")
+        assert walk(app).session.basket.ticked["LAND_SPEED"] == 999
+        assert "does not go into the report" in text(app)
+        await settle(pilot, "5")
+        assert text(app).startswith(
+            "LAND_SPEED 999 is only asked about and not advised. Allowed: whole numbers from 30"
+        )
+        await settle(pilot, "6")
+        assert text(app) == "report: yaml"
+        await settle(pilot, "4", "i", "escape")
+        assert walk(app).session.basket.ticked["LAND_SPEED"] == 999
 
 
 async def test_slash_filters_and_escape_clears(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4", "slash", *"wpn")
-        assert walk(app).choices.option_count == 1
+        assert walk(app).page.choices.option_count == 1
         assert "WPNAV_SPEED" in text(app), "the text follows what is left"
         await settle(pilot, "enter", "space")
         assert "WPNAV_SPEED" in walk(app).session.basket.ticked, "keys work on what is left"
         await settle(pilot, "escape")
-        assert walk(app).choices.option_count == 3
-        assert walk(app).step == 4
+        assert walk(app).page.choices.option_count == 3
+        assert step_of(app) == 4
         await settle(pilot, "5", "slash", *"suggested")
         assert text(app) == "+++ suggested"
         await settle(pilot, "escape")
@@ -226,8 +271,8 @@ async def test_enter_on_a_cause_opens_the_fix_at_its_option(make_app: MakeApp) -
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3", "j", "enter")
-        assert walk(app).step == 4
-        assert walk(app).choices.highlighted == 1
+        assert step_of(app) == 4
+        assert index(app) == 1
 
 
 @pytest.mark.parametrize(
@@ -262,6 +307,17 @@ async def test_an_objective_that_was_not_evaluated_has_no_causes_but_a_reason(ma
         assert "LOG_BITMASK" in text(app)
 
 
+async def test_enter_on_what_was_not_evaluated_leads_to_the_fault_that_has_causes(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "G")
+        assert "path_error" in items(app).splitlines()[index(app) or 0]
+        await settle(pilot, "enter")
+        assert title(app).startswith("Causes of mission_time")
+        assert "LAND_SPEED" in items(app)
+        assert "these are the causes of mission_time" in app.title
+
+
 async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app: MakeApp) -> None:
     lead = replace(sample.FLIES_SLOWLY, rank=1, is_lead=True, contribution=0.0)
     wind = Circumstance("wind", "wind_proxy", 9.0, "m/s", 0.0, 6.0, 0.01, "stronger than in 99 % of the training runs")
@@ -275,7 +331,7 @@ async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
         assert "none found, 1 not ruled out" in title(app)
-        assert "not ruled out, 2 % if only this is changed" in items(app)
+        assert "not ruled out" in items(app)
         assert "costs" not in text(app)
         lines = text(app).splitlines()
         assert "No change advised" in lines[0]
@@ -295,9 +351,9 @@ async def test_faults_with_the_same_causes_are_named_together(make_app: MakeApp)
     app = make_app(replace(sample.faulty(), faults=both))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
-        assert "Causes of mission_time and energy  (1 of 2 faults" in title(app)
+        assert "Causes of mission_time and energy (1 of 2 faults" in title(app)
         await settle(pilot, "o")
-        assert "Causes of energy and mission_time  (2 of 2 faults" in title(app)
+        assert "Causes of energy and mission_time (2 of 2 faults" in title(app)
 
 
 async def test_f_turns_the_diff_to_the_file_on_disk(make_app: MakeApp) -> None:
@@ -310,7 +366,7 @@ async def test_f_turns_the_diff_to_the_file_on_disk(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "5", "f")
-        assert "--config" in hints(app)
+        assert isinstance(app.screen, Prompt), "the file is asked for"
 
 
 @pytest.mark.parametrize("key", ["question_mark", "f1"])
@@ -319,12 +375,12 @@ async def test_help_lists_the_keys_that_work_here_with_their_ids(make_app: MakeA
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "6", key)
         assert isinstance(app.screen, HelpScreen)
-        shown = app.screen.query_one("#help", Lines)
+        shown = app.screen.query_one("#help", Reader)
         assert "report.export" in shown.plain
         await settle(pilot, "escape", "2", key)
-        assert "report.export" not in app.screen.query_one("#help", Lines).plain
+        assert "report.export" not in app.screen.query_one("#help", Reader).plain
         await settle(pilot, "q")
-        assert isinstance(app.screen, WalkScreen)
+        assert isinstance(app.screen, CaseScreen)
 
 
 async def test_tab_moves_between_panes(make_app: MakeApp) -> None:
@@ -334,9 +390,9 @@ async def test_tab_moves_between_panes(make_app: MakeApp) -> None:
         assert app.focused is not None
         assert app.focused.id == "text"
         await settle(pilot, "G")
-        assert walk(app).text.scroll_y > 0
+        assert walk(app).page.reader.scroll_y > 0
         await settle(pilot, "g", "j", "k", "pagedown", "pageup")
-        assert walk(app).text.scroll_y == 0
+        assert walk(app).page.reader.scroll_y == 0
         await settle(pilot, "tab")
         assert app.focused.id == "list"
 
@@ -345,36 +401,34 @@ async def test_the_mouse_opens_steps_and_items(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await pilot.click("StepBar", offset=(25, 0))
+        await pilot.click("#causes")
         await settle(pilot)
-        assert walk(app).step == 3
-        await pilot.click("#list", offset=(5, 2))
+        assert step_of(app) == 3
+        await pilot.click(walk(app).page.choices, offset=(5, 2))
         await settle(pilot)
-        assert walk(app).choices.highlighted == 1
-        await pilot.click("#list", offset=(5, 3))
+        assert index(app) == 1
+        await pilot.click(walk(app).page.choices, offset=(5, 2))
         await settle(pilot)
-        assert walk(app).step == 4
+        assert step_of(app) == 4
 
 
-async def test_a_click_on_a_hint_is_its_key(make_app: MakeApp) -> None:
+async def test_a_click_on_a_key_of_the_last_line_is_that_key(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
-        # The line is padded by one cell.
-        await pilot.click("KeyHints", offset=(1 + hints(app).index("Fix"), 0))
-        await settle(pilot)
-        assert walk(app).step == 4
-        await pilot.click("KeyHints", offset=(1 + hints(app).index("enter"), 0))
-        await settle(pilot)
-        assert walk(app).step == 5
+        for says, at in (("Fix", "fix"), ("Diff", "diff")):
+            await pilot.click(key_that(app, says))
+            await settle(pilot)
+            assert walk(app).here == at
         await settle(pilot, "3")
-        await pilot.click("KeyHints", offset=(1 + hints(app).index("Set aside"), 0))
+        await pilot.click(key_that(app, "Set aside"))
         await settle(pilot)
         assert isinstance(app.screen, Prompt)
-        await settle(pilot, "escape")
-        await pilot.click("KeyHints", offset=(hints(app).index("esc"), 0))
-        await settle(pilot)
-        assert walk(app).step == 3, "between two hints nothing is pressed"
+
+
+def key_that(app: CareApp, says: str) -> Widget:
+    """The key in the last line that does this."""
+    return next(key for key in app.screen.query("FooterKey") if key.description == says)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
@@ -396,24 +450,24 @@ async def test_q_leaves_with_the_verdict_as_exit_code(make_app: MakeApp, diagnos
 async def test_text_of_the_log_is_neither_markup_nor_escape_sequence(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(120, 40)) as pilot:
-        await settle(pilot)
+        await settle(pilot, "z")
         assert r"PreArm: [bold]check[/bold] \x1b[31mfences\x1b[0m\u202e" in text(app)
-        screen = "\n".join(strip.text for strip in app.screen._compositor.render_strips())
+        screen = shown(app)
         assert "\x1b" not in screen
         assert "\u202e" not in screen
 
 
-@pytest.mark.parametrize("step", "123456")
 @pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60)])
-async def test_no_step_is_wider_than_its_terminal(make_app: MakeApp, size: tuple[int, int], step: str) -> None:
+async def test_no_page_is_wider_than_its_terminal(make_app: MakeApp, size: tuple[int, int]) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=size) as pilot:
-        await settle(pilot, step)
-        assert app.screen.query_one("#too-small").display is False
-        for pane in (walk(app).choices, walk(app).text):
-            if pane.display:
-                assert pane.size.height >= 3, "there is room to read"
-                assert all(pane.line(y).cell_length <= pane.size.width for y in range(pane.line_count))
+        for step in "123456":
+            await settle(pilot, step)
+            assert app.screen.query_one("#too-small").display is False
+            for pane in (walk(app).page.choices, walk(app).page.reader):
+                if pane.display:
+                    assert pane.size.height >= 3, "there is room to read"
+                    assert all(pane.render_line(y).cell_length <= pane.size.width for y in range(pane.size.height))
 
 
 @pytest.mark.parametrize("size", [(59, 24), (80, 19)])
@@ -422,7 +476,7 @@ async def test_a_terminal_that_is_too_small_is_said(make_app: MakeApp, size: tup
     async with app.run_test(size=size) as pilot:
         await settle(pilot)
         assert app.screen.query_one("#too-small").display
-        assert not app.screen.query_one("#panes").display
+        assert not app.screen.query_one("#pages").display
         await pilot.resize_terminal(80, 24)
         await settle(pilot)
         assert not app.screen.query_one("#too-small").display
@@ -430,7 +484,17 @@ async def test_a_terminal_that_is_too_small_is_said(make_app: MakeApp, size: tup
 
 
 def test_every_binding_has_an_id_and_leaves_reserved_keys_alone() -> None:
-    for owner in (CareApp, PanesScreen, WalkScreen, HelpScreen, Choices, Lines, Prompt, OpenLogDialog, OverwriteDialog):
+    owners: tuple[type[DOMNode], ...] = (
+        CareApp,
+        CaseScreen,
+        HelpScreen,
+        Choices,
+        Reader,
+        Prompt,
+        OpenLogDialog,
+        Confirm,
+    )
+    for owner in (*owners, *page_classes()):
         for binding in owner.BINDINGS:
             assert not isinstance(binding, tuple)
             assert binding.id
@@ -442,9 +506,9 @@ async def test_keys_can_be_remapped_by_id(make_app: MakeApp) -> None:
     app = make_app(sample.faulty(), settings=Settings(places=(), keys={"step.next": "n", "app.quit": "x"}))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "n")
-        assert walk(app).step == 3
+        assert step_of(app) == 3
         await settle(pilot, "l")
-        assert walk(app).step == 3, "the old key is free"
+        assert step_of(app) == 3, "the old key is free"
         await settle(pilot, "x")
     assert app.return_value == ExitCode.FAULT
 
@@ -462,7 +526,7 @@ async def test_the_palette_offers_steps_and_actions(make_app: MakeApp) -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4")
         names = {command.title for command in app.get_system_commands(app.screen)}
-    assert {"Go to Log", "Go to Report", "Alternative", "Undo", "Type value", "Theme", "Help", "Quit"} <= names
+    assert {"Log", "Report", "Map", "Messages", "Alternative", "Undo", "Value", "Theme", "Help", "Quit"} <= names
 
 
 async def test_without_colours_and_in_ascii_nothing_is_lost(make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -471,7 +535,7 @@ async def test_without_colours_and_in_ascii_nothing_is_lost(make_app: MakeApp, m
     async with app.run_test(size=(80, 24)) as pilot:
         for step in "123456":
             await settle(pilot, step)
-            screen = "\n".join(strip.text for strip in app.screen._compositor.render_strips())
+            screen = shown(app)
             assert screen.isascii(), [c for c in screen if not c.isascii()]
         await settle(pilot, "2")
         assert "x FAULT" in items(app)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import care_core
+from care_core.application.case import Case
 from care_core.application.open_run import Reading
 from care_core.diagnose.records import Diagnosis, Fix
 from care_core.diagnose.whatif import question
@@ -22,10 +23,11 @@ from care_core.report.terminal import to_text
 from care_core.report.whatif import whatif_json, whatif_text
 from care_core.report.writers import published, to_json, to_yaml
 from care_core.run import Fit, FitVerdict
-from care_tui.render.causes import cause_item
+from care_tui.render.answer import answer_lines
+from care_tui.render.causes import cause_item, worth_rows
 from care_tui.render.fix import option_item, outcome_rows
-from care_tui.render.health import standing
 from care_tui.render.rows import UNICODE
+from care_tui.session import Session
 from tests.made import LAND_SPEED, made_diagnosis
 
 SAMPLE = Path(__file__).parents[2] / "samples" / "arducopter_failed.BIN"
@@ -54,6 +56,13 @@ def outputs(diagnosis: Diagnosis) -> Mapping[str, str]:
     }
 
 
+def opened(diagnosis: Diagnosis) -> Session:
+    """The app's session with this diagnosis."""
+    session = Session()
+    session.take(Case(diagnosis, (LAND_SPEED,)))
+    return session
+
+
 @pytest.mark.parametrize(
     ("verdict", "said"), [("fits", "fits"), ("partly", "partly fits: old firmware"), ("no", "does not fit: a rover")]
 )
@@ -73,7 +82,11 @@ def test_every_output_says_how_well_the_profile_fits_behind_its_verdict(
     assert list(json.loads(shown["json"]))[:2] == ["schema", "fit"]
     assert expected.partition(":")[0].removeprefix("Profile ") in shown["history"].splitlines()[0]
     assert json.loads(shown["history json"])["triages"][0]["fit"] == verdict
-    assert standing(replace(made, profile=choice), UNICODE)[0].plain.removeprefix("! ").startswith(expected)
+    pinned = [line.plain for line in answer_lines(opened(replace(made, profile=choice)), UNICODE, 79, is_low=False)]
+    if verdict == "fits":
+        assert pinned[0].endswith("  profile fits"), "a word in the corner"
+    else:
+        assert any(line.startswith(f"! {expected}") for line in pinned)
     asked = replace(reading.question, profile=replace(reading.choice, fit=choice.fit))
     answer = asked.ask({OPTION: 40.0})
     assert whatif_text(asked, answer).startswith(expected)
@@ -104,9 +117,9 @@ def test_a_value_that_no_source_holds_is_shown_as_assumed_in_every_output(readin
     assert document["faults"][0]["causes"][0]["assumed"] is document["fix"]["changes"][0]["assumed"] is True
     assert shown["yaml"].count("assumed: true") == 3, "the cause, the change and that of the alternative"
     assert "-LAND_SPEED" not in shown["yaml"], "what no source holds is no line of the configuration as driven"
-    assert "16 (assumed) → 50" in cause_item(cause, None, None, UNICODE)[0].plain
-    assert "16 (assumed) → 50" in option_item(LAND_SPEED, 16.0, True, 50.0, True, "", 12, UNICODE).plain
-    assert "16 cm/s (assumed)" in option_item(LAND_SPEED, 16.0, True, None, False, "", 12, UNICODE).plain
+    assert "16 (assumed) → 50" in cause_item(cause, None, None, UNICODE, 80).plain
+    assert "16 (assumed) → 50" in option_item(LAND_SPEED, 16.0, True, 50.0, True, None, 12, UNICODE).plain
+    assert "16 cm/s (assumed)" in option_item(LAND_SPEED, 16.0, True, None, False, None, 12, UNICODE).plain
 
     judged = reading.judged
     config = {name: value for name, value in judged.run.config.items() if name != OPTION}
@@ -126,7 +139,7 @@ def test_no_probability_outside_the_training_runs_stands_without_its_warning(rea
         assert unwarned(shown[name], fix) == [], name
     assert json.loads(shown["json"])["fix"]["guess"] is True
     rows = [row.content.plain for row in outcome_rows(fix, made.objectives, UNICODE)]
-    assert [row for row in rows if "92 %" in row and "(a guess)" not in row] == []
+    assert [row for row in rows if "92 %" in row and "a guess" not in row] == []
 
     answer = reading.question.ask({OPTION: 400.0})
     asked = Fix(answer.changes, answer.p_ok, {str(i): one.predicted for i, one in enumerate(answer.outlooks)})
@@ -151,5 +164,6 @@ def test_every_promise_stands_beside_the_odds_as_driven() -> None:
         assert flat.count("; as driven 5%") >= 3, f"{name}: headline, cause and alternative"
     assert "(90%; as driven 5%)" in shown["history"]
     assert json.loads(shown["json"])["odds_as_driven"] == 0.05
-    cause = diagnosis.faults[0].causes[0]
-    assert "90 % if only this is changed (as driven 5 %)" in cause_item(cause, None, None, UNICODE, 0.05)[1].plain
+    cause, result = diagnosis.faults[0].causes[0], diagnosis.faults[0].objective
+    (odds,) = [row.content.plain for row in worth_rows(cause, result, 0.05, UNICODE) if "90 %" in row.content.plain]
+    assert odds.endswith("90 %  without 5 %")

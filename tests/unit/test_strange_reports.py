@@ -190,7 +190,7 @@ def test_a_file_that_does_not_read_back_stays_what_it_was(
     def lossy(path: Path, text: str, mode: int | None = None) -> None:
         real(path, text.replace("LAND_SPEED,40", "LAND_SPEED,4"), mode)
 
-    monkeypatch.setattr(files, "write_atomically", lossy)
+    monkeypatch.setattr("care_core.configs.writing.write_atomically", lossy)
     code, _, err = care("apply", edited(), params, *(("-o", new) if way == "-o" else (way,)))
     assert code == 2
     assert "does not hold the changes" in err

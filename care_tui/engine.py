@@ -1,14 +1,13 @@
-"""What runs in worker threads. The bodies call care_core and touch no widget."""
+"""Everything the app asks of care_core, in worker threads: the functions touch no widget."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, open_case, predict
-from care_core.application.configuring import DiffSide, commands_of, diff_of
+from care_core.application.configuring import DiffSide, apply_to_files, commands_of, diff_of
 from care_core.application.history_writing import remember_triage
 from care_core.application.reporting import report_of
 from care_core.errors import CareError
@@ -17,46 +16,12 @@ from care_core.records import Record
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
 
-T = TypeVar("T")
+CAUSES = 10
+"""Most causes per fault in the app: more than a report shows, for here they scroll."""
 
 
 class CancelledError(BaseException):
     """The operator took the work back. Not an Exception: no reader may mistake it for damage and go on."""
-
-
-class Job:
-    """Work in a thread of its own that nobody waits for: not the operator who stops it, nor the end of the program.
-
-    A thread cannot be stopped from outside without leaving locks behind (that of an import, for one), so one that is
-    cancelled ends at its next `check`; whatever it answers is dropped.
-    """
-
-    def __init__(self) -> None:
-        self.cancelled = False
-        self.done = False
-
-    def start(self, work: Callable[[Job], T], receive: Callable[[T | CareError], None]) -> None:
-        """Run `work`; its answer, or its error, goes to `receive`, in that thread."""
-        threading.Thread(target=self._run, args=(work, receive), daemon=True).start()
-
-    def _run(self, work: Callable[[Job], T], receive: Callable[[T | CareError], None]) -> None:
-        try:
-            answer: T | CareError = work(self)
-        except CancelledError:
-            return
-        except Exception as err:
-            answer = as_care_error(err)
-        if not self.cancelled:
-            receive(answer)
-
-    def check(self) -> None:
-        """Raise CancelledError when the work is not wanted any more."""
-        if self.cancelled:
-            raise CancelledError
-
-
-CAUSES = 10
-"""Most causes per fault in the app: more than a report shows, for here they scroll."""
 
 
 def open_and_warm(request: Request, progress: Progress) -> Case:
@@ -82,7 +47,7 @@ def save_text(path: Path, text: str) -> None:
 
 
 class Engine(Record):
-    """Everything the walk asks of care_core."""
+    """The questions. Tests give answers of their own."""
 
     diagnose: Callable[[Request, Progress], Case] = open_and_warm
     predict: Callable[[Case, Mapping[str, float]], Fix] = predict
@@ -92,6 +57,7 @@ class Engine(Record):
     save: Callable[[Path, str], None] = save_text
     remember: Callable[[Diagnosis, Request], CareError | None] = remember_triage
     compare: Callable[[Request, Request, Progress], str] = comparison_of
+    apply: Callable[[Case, Fix], list[tuple[Path, Path]]] = apply_to_files
 
 
 def as_care_error(err: Exception) -> CareError:

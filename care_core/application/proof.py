@@ -1,0 +1,135 @@
+"""Which signals show a finding, a cause or an objective: one choice for the plots of the app and of pages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from care_core.application.open_run import OpenRun, log_of
+from care_core.application.signals import Signal, signals_of
+from care_core.diagnose.records import Cause, ObjectiveResult
+from care_core.ecosystems.dictionary import Field
+from care_core.ecosystems.findings import Finding, FindingKind, every_finding
+from care_core.ecosystems.registry import ecosystem_of
+from care_core.records import Record, replace
+
+Subject = Finding | Cause | ObjectiveResult
+Meaning = Callable[[str, str], Field]
+
+_POSITION = re.compile(r"position\.|(^|\.)(latitude|longitude|altitude)$")
+"""Fields of ROS messages that say where a robot was, of whatever type."""
+_WORD = re.compile(r"/[\w/]+|\w+")
+_MOTOR = re.compile(r"motor (\d+)")
+_SHOWN_BY: Mapping[FindingKind, str] = {
+    "motor": "motor",
+    "thrust": "throttle height",
+    "vibration": "vibration",
+    "gps": "satellites",
+    "compass": "magnetic",
+    "estimator": "estimator",
+    "barometer": "barometer",
+    "battery": "battery",
+    "attitude": "roll pitch",
+    "tuning": "roll pitch",
+    "takeoff": "height",
+    "crash": "height",
+    "localisation": "position",
+    "drive": "speed",
+    "blocked": "speed",
+    "planner": "speed",
+    "control": "speed",
+    "commands": "height speed",
+}
+"""Words of a signal's label that a kind of finding is seen in, where its source names no signal."""
+_ALIKE = {
+    "landing": "height",
+    "descent": "height",
+    "climb": "height",
+    "down": "height",
+    "altitude": "height",
+    "energy": "current",
+    "power": "current",
+    "heading": "yaw",
+    "acceleration": "speed",
+    "stall": "speed",
+    "standstill": "speed",
+}
+"""Words of findings and metrics, and the word that the label of the signal has for it."""
+
+
+class Proof(Record):
+    """What of a log shows something: signals, the most telling first, and the time that it is about, if it has one."""
+
+    signals: tuple[Signal, ...]
+    start_s: float | None = None
+    end_s: float | None = None
+
+
+def meanings(case: OpenRun) -> Meaning:
+    """What a signal of a run's log means, by channel and field; what a dictionary lacks is judged by its name."""
+    log = log_of(case)
+    ecosystem, channels = ecosystem_of(log.format), {channel.name: channel for channel in log.channels()}
+
+    def meaning(name: str, field: str) -> Field:
+        found = (ecosystem.field(channels[name], field) if name in channels else None) or Field()
+        return replace(found, is_position=found.is_position or _POSITION.search(field) is not None)
+
+    return meaning
+
+
+def proof_of(case: OpenRun, subject: Subject, signals: Sequence[Signal] | None = None) -> Proof:
+    """The signals that show it; a cause that a finding names is shown by what shows the finding.
+
+    Args:
+        signals: those of the log, where they were looked up before.
+    """
+    signals, meaning = signals_of(case) if signals is None else signals, meanings(case)
+    found = _finding_of(case, subject) if isinstance(subject, Cause) else subject
+    scores = [(_score(found, one, meaning(one.channel, one.field)), one) for one in signals]
+    ranked = tuple(one for score, one in sorted(scores, key=lambda pair: -pair[0]) if score > 0)
+    is_span = isinstance(found, Finding) and found.end_s > found.onset_s
+    return Proof(ranked, found.onset_s, found.end_s) if is_span and isinstance(found, Finding) else Proof(ranked)
+
+
+def _finding_of(case: OpenRun, cause: Cause) -> Finding | Cause:
+    """The finding that names the cause's option, else the cause."""
+    names = {cause.option.name, *cause.option.parameters}
+    findings = every_finding(case.diagnosis.health.findings)
+    return next((one for one in findings if names & set(one.parameters)), cause)
+
+
+def _score(subject: Subject, signal: Signal, field: Field) -> float:
+    if isinstance(subject, Finding):
+        return finding_score(subject, signal, field)
+    nodes = [node.name for node in subject.path] if isinstance(subject, Cause) else [subject.name]
+    # What stands right behind the parameter tells most of it; the objective itself has many signals.
+    weights = {name: 1.0 / max(place, 1) for place, name in enumerate(nodes)}
+    used = [weights[name] for name in signal.used_by if name in weights]
+    if not used:
+        return 0.0
+    words = _with_alike(word for name in nodes[:2] for word in name.split("_"))
+    share = len(used) / len(signal.used_by)
+    return max(used) + share + 2.0 * _overlap(field, words) - (0.9 if field.is_position else 0.0)
+
+
+def finding_score(finding: Finding, signal: Signal, field: Field) -> float:
+    """How much a signal shows of a finding; 0 where it has nothing to do with it."""
+    named = [word.casefold() for word in _WORD.findall(finding.source)]
+    fields = {signal.field.casefold(), *((signal.wanted[1].casefold(),) if signal.wanted else ())}
+    title = _with_alike(_WORD.findall(finding.title.casefold()))
+    motor = _MOTOR.search(finding.title)
+    told = 2.0 * _overlap(field, title) + 1.0 * bool(fields & set(named))
+    told += 3.0 if motor and re.fullmatch(rf"\D*{motor[1]}(_raw)?", signal.field) else 0.0
+    if signal.channel.casefold() in named:
+        return 5.0 - 0.2 * named.index(signal.channel.casefold()) + told - 1.5 * field.is_position
+    seen_in = _overlap(field, set(_SHOWN_BY.get(finding.kind, "").split()))
+    return 0.5 * seen_in if seen_in and not field.is_position else 0.0
+
+
+def _with_alike(words: Iterable[str]) -> set[str]:
+    found = set(words)
+    return found | {_ALIKE[word] for word in found if word in _ALIKE}
+
+
+def _overlap(field: Field, words: set[str]) -> int:
+    return len(set(re.findall(r"\w+", field.label.casefold())) & words)

@@ -1,0 +1,115 @@
+"""Where a robot went, and the way that it was asked to go, in metres. Runs in worker threads; touches no widget."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from care_core.application.open_run import OpenRun, log_of
+from care_core.application.signals import Source, lines_of, type_name, whole_of
+from care_core.errors import CareError
+from care_core.records import Record
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_METRES_PER_DEGREE = 111_195.0
+_GLOBAL = (("POS", "Lat", "Lng"), ("GPS", "Lat", "Lng"), ("vehicle_global_position", "lat", "lon"))
+_LOCAL = (("vehicle_local_position", "y", "x"),)
+_POSES = {"Odometry": "pose.pose.position", "PoseWithCovarianceStamped": "pose.pose.position"}
+_GOALS = {"MoveBaseActionGoal": "goal.target_pose.pose.position", "PoseStamped": "pose.position"}
+_MOST = 2000
+"""Points of a track."""
+
+Point = tuple[float, float]
+
+
+class Way(Record):
+    """A track and its legs as points (metres to the east, metres to the north), with the times of the track."""
+
+    track: tuple[Point, ...]
+    times_s: tuple[float, ...]
+    legs: tuple[Point, ...] = ()
+    """The way that was asked for, corner by corner; empty where the log does not say."""
+
+
+def way_of(case: OpenRun) -> Way:
+    """Where the robot went in the mission. Raises CareError where the log does not say."""
+    span, present = whole_of(case), {channel.name: channel.type for channel in log_of(case).channels() if channel.count}
+    for channel, north, east in _GLOBAL:
+        if channel in present:
+            found = _track(case, (channel, east), (channel, north), span)
+            if found is not None:
+                return _on_the_ground(*found, _flown_to(case, present))
+    sources = [((channel, x), (channel, y)) for channel, x, y in _LOCAL if channel in present]
+    sources += [((name, f"{_POSES[kind]}.x"), (name, f"{_POSES[kind]}.y"))
+                for name, type in present.items() if (kind := type_name(type)) in _POSES]  # fmt: skip
+    for x, y in sources:
+        found = _track(case, x, y, span)
+        if found is not None:
+            t, east_m, north_m = found
+            return Way(_points(east_m, north_m), tuple(t.tolist()), _driven_to(case, present, span))
+    raise CareError("The log does not say where the robot was.", hint="Record its position.")
+
+
+def _track(
+    case: OpenRun, x: Source, y: Source, span: tuple[float, float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+    import numpy as np
+
+    lines = lines_of(case, (x, y), span)
+    across, along = lines[x], lines[y]
+    if across is None or along is None or len(across[1]) < 2 or len(across[1]) != len(along[1]):
+        return None
+    some = np.unique(np.linspace(0, len(across[0]) - 1, min(_MOST, len(across[0]))).astype(int))
+    return across[0][some], across[1][some], along[1][some]
+
+
+def _on_the_ground(
+    t: NDArray[np.float64], lng: NDArray[np.float64], lat: NDArray[np.float64], corners: tuple[Point, ...]
+) -> Way:
+    """Degrees as metres from where the track begins."""
+    home_lng, home_lat = float(lng[0]), float(lat[0])
+    narrow = math.cos(math.radians(home_lat))
+
+    def metres(east: float, north: float) -> Point:
+        return (east - home_lng) * _METRES_PER_DEGREE * narrow, (north - home_lat) * _METRES_PER_DEGREE
+
+    track = tuple(metres(float(east), float(north)) for east, north in zip(lng, lat, strict=True))
+    legs = tuple(metres(*corner) for corner in corners)
+    return Way(track, tuple(t.tolist()), ((0.0, 0.0), *legs) if legs else ())
+
+
+def _flown_to(case: OpenRun, present: Mapping[str, str]) -> tuple[Point, ...]:
+    """The corners of an ArduPilot mission in degrees, longitude first, each item once."""
+    if "CMD" not in present:
+        return ()
+    table = log_of(case).read({"CMD": ["CNum", "Lat", "Lng"]}).get("CMD")
+    if table is None or not {"CNum", "Lat", "Lng"} <= set(table.columns):
+        return ()
+    items = {
+        int(number): (float(lng), float(lat))
+        for number, lat, lng in zip(table["CNum"], table["Lat"], table["Lng"], strict=True)
+        if number and lat and lng
+    }
+    return tuple(items[number] for number in sorted(items))
+
+
+def _driven_to(case: OpenRun, present: Mapping[str, str], span: tuple[float, float]) -> tuple[Point, ...]:
+    """The goals that a ROS robot was sent to, in the order sent."""
+    for kind, field in _GOALS.items():
+        for name, type in present.items():
+            if type_name(type) != kind or "goal" not in name:
+                continue
+            x, y = (name, f"{field}.x"), (name, f"{field}.y")
+            lines = lines_of(case, (x, y), (0.0, span[1]))
+            east, north = lines[x], lines[y]
+            if east is not None and north is not None:
+                return _points(east[1], north[1])
+    return ()
+
+
+def _points(east: NDArray[np.float64], north: NDArray[np.float64]) -> tuple[Point, ...]:
+    return tuple((float(x), float(y)) for x, y in zip(east, north, strict=True))

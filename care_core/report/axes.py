@@ -1,0 +1,53 @@
+"""Round numbers at the axes of a plot, in the app and in pages."""
+
+from __future__ import annotations
+
+import math
+
+from care_core.text import LONG_S, seconds
+
+_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+_STEPS_OF_TIME = (
+    0.1,
+    0.2,
+    0.5,
+    1.0,
+    2.0,
+    5.0,
+    10.0,
+    15.0,
+    20.0,
+    30.0,
+    60.0,
+    120.0,
+    300.0,
+    600.0,
+    1200.0,
+    1800.0,
+    3600.0,
+)
+
+
+def value_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
+    """About so many round values between two others."""
+    step = _nice((high - low) / most)
+    first = math.ceil(low / step)
+    return tuple(float(f"{i * step:.12g}") for i in range(first, math.floor(high / step) + 1))
+
+
+def time_ticks(start_s: float, end_s: float, most: int) -> tuple[float, ...]:
+    """At most so many round times, in seconds of the log."""
+    span = max(end_s - start_s, 1e-9)
+    step = next((step for step in _STEPS_OF_TIME if span / step <= most), _nice(span / most))
+    return tuple(round(i * step, 6) for i in range(math.ceil(start_s / step), math.floor(end_s / step) + 1))
+
+
+def tick_time(time_s: float) -> str:
+    """A round time as an axis has it: 60, from ten minutes on 12:05."""
+    return seconds(time_s) if abs(time_s) >= LONG_S else f"{time_s:g}"
+
+
+def _nice(step: float) -> float:
+    """The next round number: 1, 2, 2.5 or 5 times a power of ten."""
+    power = float(10.0 ** math.floor(math.log10(step)))
+    return next(nice * power for nice in _STEPS if nice * power >= step * (1 - 1e-9))

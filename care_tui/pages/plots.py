@@ -1,0 +1,181 @@
+"""Signals of the log drawn over the mission: what was wanted beside what came of it, with what happened marked."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from textual.binding import Binding, BindingType
+from textual.content import Content
+
+from care_core.application.proof import Proof, Subject, proof_of
+from care_core.application.signals import Signal, whole_of
+from care_core.errors import CareError
+from care_core.records import replace
+from care_core.report.marks import Mark, marks_of
+from care_core.text import seconds
+from care_tui.pages.page import Page, View, enter_to, sentence, view_of
+from care_tui.pages.proofs import figure_of, signals_in
+from care_tui.render.plot import AXIS, LOWEST, Figure, dots_across, mark_rows
+from care_tui.render.rows import ASCII, Row, Rows, error_rows, padded, text
+from care_tui.widgets.choices import Listing
+from care_tui.workspace import Workspace
+
+NAME_WIDTH = 14
+MOST_TOLD = 6
+"""Marks that are told below a plot."""
+SHORTEST_S = 0.5
+"""Nothing is drawn that is shorter."""
+PROOF = "proof"
+NOTHING = Proof(())
+
+Span = tuple[float, float]
+
+
+class PlotsPage(Page):
+    HELP = (
+        "Signals of the log, those first that prove what the cursor was on; what was wanted has a colour of its own, "
+        "and the time of the finding is shaded. + and - draw less and more of the time around the moment, n goes to "
+        "the next mark, x keeps a signal beside the others, Enter leads to the messages of the moment. / filters."
+    )
+    FITS = True
+    BINDINGS: ClassVar[list[BindingType]] = [
+        enter_to("Messages"),
+        Binding("plus,right_square_bracket", "zoom(0.5)", "Closer", key_display="+", id="signals.closer"),
+        Binding("minus,left_square_bracket", "zoom(2.0)", "Farther", key_display="-", id="signals.farther"),
+        Binding("n", "next_marked", "Next mark", id="signals.next"),
+        Binding("x", "keep", "Keep beside", id="signals.beside"),
+    ]
+
+    def __init__(self, workspace: Workspace, *, id: str | None = None) -> None:
+        super().__init__(workspace, id=id)
+        case = workspace.session.case
+        assert case is not None
+        self._case = case
+        self._whole: Span | None = None
+        self._span: Span = (0.0, 1.0)
+        self._moment: float | None = None
+        self._subject: Subject | None = None
+        self._beside: Signal | None = None
+        self._marks = marks_of(case.diagnosis)
+
+    # What is drawn
+
+    def look_at(self, moment_s: float | None, subject: Subject | None) -> None:
+        self._moment, self._subject = moment_s, subject
+        self.forget(PROOF)
+        if moment_s is not None and not self._span[0] <= moment_s <= self._span[1]:
+            self._span = min(self._span[0], moment_s), max(self._span[1], moment_s)
+        if self.is_mounted and self.choices.option_count:
+            self.choices.highlighted = 0  # the signal that proves it comes first
+
+    def view(self) -> View:
+        case, subject, session = self._case, self._subject, self.session
+
+        def work() -> Proof:
+            signals = signals_in(session, case)
+            found = proof_of(case, subject, signals) if subject is not None else NOTHING
+            others = tuple(one for one in signals if one not in found.signals)
+            return replace(found, signals=(*found.signals, *others))
+
+        return view_of("Plots", self.fetched(PROOF, work), self._show)
+
+    def _show(self, proof: Proof) -> View:
+        if self._whole is None:
+            self._whole = self._span = whole_of(self._case)
+        signals = proof.signals
+        if not signals:
+            return View(Content("Plots"), lambda _: sentence("The log holds no signal that is known here."))
+        at = "" if self._moment is None else f", at {seconds(self._moment)}"
+        title = Content(f"{seconds(self._span[0])} to {seconds(self._span[1])}{at}")
+        listing = Listing(
+            len(signals),
+            lambda i, _width: (self._item(signals[i]),),
+            lambda i: f"{signals[i].name} {signals[i].wanted_name} {' '.join(signals[i].used_by)}",
+        )
+        return View(title, lambda i: self._detail(None if i is None else signals[i], proof), listing)
+
+    def _item(self, signal: Signal) -> Content:
+        mark = self.glyphs.root if signal == self._beside else " "
+        line = Content(f"{mark} ") + padded(signal.name, NAME_WIDTH, "bold")
+        if signal.wanted_name:
+            line += text(f"  to follow {signal.wanted_name}")
+        return line + text("  for " + ", ".join(signal.used_by), "dim") if signal.used_by else line
+
+    def _detail(self, signal: Signal | None, proof: Proof) -> Rows:
+        if signal is None:
+            return Rows([])
+        width, height = self.reader.room
+        shown = [signal] if self._beside in (None, signal) else [signal, self._beside]
+        told = self._told(max(height - len(shown) * (LOWEST + 6), 0))
+        each = (height - len(told)) // len(shown)
+        rows: list[Row] = []
+        for one in shown:
+            assert one is not None
+            figure = self._figure(one, proof, width)
+            if isinstance(figure, CareError):
+                rows += error_rows(figure).rows
+            elif figure is None:
+                rows.append(Row(Content.assemble(text(one.name, "bold"), "  Reading...")))
+            else:
+                rows += figure.rows(width, each, self.glyphs)
+        return Rows([*rows, *mark_rows(told, self.glyphs)])
+
+    def _figure(self, signal: Signal, proof: Proof, width: int) -> Figure | CareError | None:
+        columns, span, case = dots_across(max(width - AXIS, 10), ascii=self.glyphs is ASCII), self._span, self._case
+        question = f"{signal.name} {span} {columns} {proof.start_s}"
+        found = self.fetched(question, lambda: figure_of(case, signal, proof, span, columns))
+        return replace(found, cursor_s=self._moment) if isinstance(found, Figure) else found
+
+    def _told(self, room: int) -> list[Mark]:
+        """Marks in words as far as there is room: those around the moment, else the gravest."""
+        inside = [mark for mark in self._marks if self._span[0] <= mark.time_s <= self._span[1]]
+        near = sorted(inside, key=self._weight)[: min(room, MOST_TOLD)]
+        return sorted(near, key=lambda mark: mark.time_s)
+
+    def _weight(self, mark: Mark) -> tuple[float, float]:
+        return (mark.rank, mark.time_s) if self._moment is None else (abs(mark.time_s - self._moment), mark.time_s)
+
+    # The moment, and how much is drawn around it
+
+    def moment_s(self) -> float | None:
+        return self._moment
+
+    def action_open(self) -> None:
+        """Show the messages of the moment."""
+        self.go("messages", self._moment)
+
+    def action_zoom(self, by: float) -> None:
+        """Draw half or twice of the time around the moment, at most the whole log."""
+        start, end = self._span
+        middle = (start + end) / 2 if self._moment is None else self._moment
+        self._draw_around(middle, max((end - start) / 2 * by, SHORTEST_S / 2))
+
+    def _draw_around(self, middle: float, half: float) -> None:
+        log, whole = self._case.log, self._whole or self._span
+        last = max(whole[1], 0.0 if log is None else log.duration_s)
+        low = max(min(middle - half, last - 2 * half), 0.0)
+        self._span = low, min(low + 2 * half, last)
+        self.show()
+
+    def action_next_marked(self) -> None:
+        """Go to the next mark of what happened, the first after the last; as much of the time is drawn as before."""
+        if not self._marks:
+            self.say("Nothing is marked in this log.")
+            return
+        here = -math.inf if self._moment is None else self._moment
+        mark = next((mark for mark in self._marks if mark.time_s > here), self._marks[0])
+        self._moment = mark.time_s
+        if self._span[0] <= mark.time_s <= self._span[1]:
+            self.show()
+        else:
+            self._draw_around(mark.time_s, (self._span[1] - self._span[0]) / 2)
+        self.say(f"{seconds(mark.time_s)}  {mark.words}")
+
+    def action_keep(self) -> None:
+        """Keep the signal under the cursor in view beside the others, or let it go."""
+        found = self._answers.get(PROOF)
+        if isinstance(found, Proof) and self.index is not None:
+            here = found.signals[self.index]
+            self._beside = None if here == self._beside else here
+            self.show()

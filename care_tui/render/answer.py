@@ -1,0 +1,113 @@
+"""The answer of a run in at most five lines: the fault, its cause, the change with its odds, and what limits it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from textual.content import Content
+
+from care_core.diagnose.records import Diagnosis
+from care_core.diagnose.verdict import hypothesis_text, verdict_of
+from care_core.ecosystems.findings import every_finding
+from care_core.text import clean
+from care_tui.render.health import warnings_of
+from care_tui.render.odds import bar, promise
+from care_tui.render.rows import Glyphs, change_text, percent, progress_bar, status, text
+from care_tui.session import Session
+
+_LABEL = 9
+_FITS = "profile fits"
+
+
+def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) -> list[Content]:
+    """The answer as far as it is known; `is_low`: there is room for few lines."""
+    name = "" if session.path is None else clean(session.path.name)
+    if session.state == "empty":
+        return [Content.styled("No log is open", "bold"), Content("Enter opens the one under the cursor, o any other")]
+    if session.state == "error" and session.error is not None:
+        return [
+            Content.styled(f"{glyphs.fault} No diagnosis of {name}", "bold $text-error"),
+            text(session.error.message),
+        ]
+    if session.state == "loading":
+        step, fraction = session.progress or ("starting", 0.0)
+        head = Content.assemble("Reading ", (name, "bold"), ("  esc stops", "dim"))
+        return [head, progress_bar(fraction, glyphs) + text(f"  {step}")]
+    lines = [_head(session.diagnosis, glyphs, width), *_cause_and_change(session, glyphs, is_low=is_low)]
+    return [*lines, *_limits(session.diagnosis, is_low=is_low)]
+
+
+def _head(diagnosis: Diagnosis, glyphs: Glyphs, width: int) -> Content:
+    """The fault in words; that the profile fits stands in the corner, where there is one."""
+    verdict = verdict_of(diagnosis)
+    told = Content.assemble(status(verdict.status, glyphs), "  ", (clean(verdict.failed), "bold"))
+    if diagnosis.profile.fit.verdict != "fits":
+        return told
+    room = width - len(_FITS) - 2
+    cut = told if told.cell_length <= room else told.truncate(room - 1) + glyphs.more
+    return cut.pad_right(width - len(_FITS) - cut.cell_length) + Content.styled(_FITS, "dim")
+
+
+def _cause_and_change(session: Session, glyphs: Glyphs, *, is_low: bool) -> Iterator[Content]:
+    diagnosis = session.diagnosis
+    hypotheses = session.hypotheses()
+    if hypotheses:
+        first = hypotheses[0]
+        found = [one for one in every_finding(diagnosis.health.findings) if one.title == first.name]
+        yield (
+            _labelled("Cause")
+            + bar(first.probability, glyphs)
+            + Content.assemble(
+                (f" {percent(first.probability):>5}  ", "bold"),
+                text(hypothesis_text(first, found, diagnosis.outside), "bold"),
+            )
+        )
+    elif causes := [cause for fault in diagnosis.faults for cause in fault.causes if not cause.is_lead]:
+        yield _labelled("Cause") + text(causes[0].option.name, "bold")
+    change = _change(session, glyphs)
+    if change is not None:
+        yield change
+    elif diagnosis.abstained:
+        yield _labelled("Change") + text(f"none advised: {diagnosis.abstained}", "$text-warning")
+    elif diagnosis.faults and not is_low:
+        yield _labelled("Change") + Content("none is known that helps")
+
+
+def _change(session: Session, glyphs: Glyphs) -> Content | None:
+    """What is ticked, with the odds of it and without it; None where nothing is."""
+    ticked = session.basket.ticked
+    options = {option.name: option for option in session.options()} if ticked else {}
+    if not ticked:
+        return None
+    name, value = next(iter(ticked.items()))
+    option = options[name]
+    change = change_text(option, session.current(option), session.is_assumed(option), value, glyphs)
+    more = f" and {len(ticked) - 1} more" if len(ticked) > 1 else ""
+    without = session.odds_unchanged()
+    fix = session.fix
+    if session.fix_error is not None:
+        odds = Content.styled("no prediction", "$text-warning")
+    elif fix is None:
+        odds = Content("...")
+    elif fix.odds is None:
+        odds = Content("odds not measured")
+    else:
+        odds = promise(fix.odds, glyphs) + Content.styled(" a guess" if fix.is_guess else "", "$text-warning")
+    beside = Content.styled("" if without is None else f"  without {percent(without)}", "dim")
+    again = Content.styled("  unless it happens again", "$text-warning") if session.diagnosis.lost_by else Content()
+    return Content.assemble(_labelled("Change"), odds, "  ", text(name, "bold"), " ", change, more, beside, again)
+
+
+def _limits(diagnosis: Diagnosis, *, is_low: bool) -> Iterator[Content]:
+    """What limits the answer, where something does."""
+    fit = diagnosis.profile.fit
+    found = warnings_of(diagnosis)
+    if fit.verdict != "fits":
+        style = "$text-warning" if fit.verdict == "partly" else "bold $text-error"
+        yield Content.styled(f"! {clean(verdict_of(diagnosis).fit)}", style)
+    if found and not (is_low and fit.verdict != "fits"):
+        yield Content.styled("! " + clean("; ".join(found)), "$text-warning")
+
+
+def _labelled(label: str) -> Content:
+    return Content.styled(f"{label:<{_LABEL}}", "dim")

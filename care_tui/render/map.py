@@ -1,0 +1,81 @@
+"""A track and the way that was asked for, in text: dots of braille, or stars where the terminal has only ASCII."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from textual.content import Content
+
+from care_core.application.track import Point, Way
+from care_core.report.marks import Mark
+from care_core.text import figures
+from care_tui.render.health import sign_of
+from care_tui.render.plot import ACTUAL, WANTED, assembled, dot_sign
+from care_tui.render.rows import ASCII, Glyphs, Row
+
+_TALL = 2.0
+"""How much higher than wide a cell is."""
+
+
+class _Canvas:
+    """Dots of both lines, and signs above them. A dot is half a cell wide, a quarter high; in ASCII it is a cell."""
+
+    def __init__(self, way: Way, width: int, height: int, *, ascii: bool) -> None:
+        points = [*way.track, *way.legs]
+        self.ascii, self.width, self.height = ascii, width, height
+        self.across, self.down = (1, 1) if ascii else (2, 4)
+        east, north = [x for x, _ in points], [y for _, y in points]
+        self.left, self.top = min(east), max(north)
+        wide, high = max(max(east) - self.left, 0.1), max(self.top - min(north), 0.1)
+        self.metres = max(wide / max(width - 1, 1), high / max((height - 1) * _TALL, 1))
+        """Metres that a cell is wide."""
+        self.left -= (width * self.metres - wide) / 2
+
+    def dot(self, point: Point) -> tuple[int, int]:
+        x = (point[0] - self.left) / self.metres * self.across
+        y = (self.top - point[1]) / (self.metres * _TALL) * self.down
+        return (min(max(round(x), 0), self.width * self.across - 1), min(max(round(y), 0), self.height * self.down - 1))
+
+    def line(self, points: Sequence[Point]) -> Iterator[tuple[int, int]]:
+        """Every dot of the way through these points."""
+        dots = [self.dot(point) for point in points]
+        for (x1, y1), (x2, y2) in pairwise(dots):
+            steps = max(abs(x2 - x1), abs(y2 - y1), 1)
+            yield from ((round(x1 + (x2 - x1) * i / steps), round(y1 + (y2 - y1) * i / steps)) for i in range(steps))
+        yield from dots[-1:]
+
+    def cells(self, dots: Iterator[tuple[int, int]], *, dotted: bool = False) -> dict[tuple[int, int], str]:
+        """The cells that a line fills; a dotted one keeps every other dot."""
+        found: dict[tuple[int, int], set[tuple[int, int]]] = {}
+        for x, y in dots:
+            if not dotted or self.ascii or (x + y) % 3 == 0:
+                found.setdefault((x // self.across, y // self.down), set()).add((x % self.across, y % self.down))
+        sign = "." if dotted else "*"
+        return {cell: sign if self.ascii else dot_sign(bits) for cell, bits in found.items()}
+
+
+def map_rows(way: Way, marks: Sequence[Mark], width: int, height: int, glyphs: Glyphs) -> list[Row]:
+    """The map in so many cells, with what its signs mean."""
+    canvas = _Canvas(way, width, max(height - 2, 4), ascii=glyphs is ASCII)
+    legs = canvas.cells(canvas.line(way.legs), dotted=True) if way.legs else {}
+    drawn = {cell: (sign, WANTED) for cell, sign in legs.items()}
+    drawn |= {cell: (sign, ACTUAL) for cell, sign in canvas.cells(canvas.line(way.track)).items()}
+    signs = {**dict.fromkeys(way.legs, "o"), way.track[0]: "S", way.track[-1]: "E"}
+    signs |= {_at(way, mark.time_s): sign_of(mark, glyphs) for mark in marks}
+    for point, sign in signs.items():
+        x, y = canvas.dot(point)
+        drawn[x // canvas.across, y // canvas.down] = sign, "bold $text-error" if sign == glyphs.fault else "bold"
+    rows = [Row(assembled([drawn.get((x, y), (" ", "")) for x in range(canvas.width)])) for y in range(canvas.height)]
+    scale = f"{figures(canvas.metres * 10, 2)} m"
+    asked = Content.assemble(("  ... asked for, o its corners", WANTED) if way.legs else "")
+    legend = Content.assemble(
+        f"{glyphs.rule * 10} {scale}  ", (f"{glyphs.root} track", ACTUAL), "  S start  E end", asked
+    )
+    return [*rows, Row(Content()), Row(legend)]
+
+
+def _at(way: Way, time_s: float) -> Point:
+    """Where the robot was at this time."""
+    place = min(range(len(way.times_s)), key=lambda i: abs(way.times_s[i] - time_s))
+    return way.track[place]

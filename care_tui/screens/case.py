@@ -1,0 +1,384 @@
+"""The screen of a case: the answer under two rows of tabs, and one page at a time below."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, cast
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.reactive import Reactive
+from textual.screen import Screen
+from textual.widget import Widget
+from textual.widgets import ContentSwitcher, Static
+from textual.worker import get_current_worker
+
+from care_core.application.case import Case, Request
+from care_core.application.proof import Subject
+from care_core.diagnose.records import Fix
+from care_core.diagnose.verdict import verdict_of
+from care_core.ecosystems.findings import Health
+from care_core.errors import CareError
+from care_core.records import Record, replace
+from care_core.text import clean
+from care_tui.engine import CAUSES, CancelledError, as_care_error
+from care_tui.messages import Answered, Decided, Go, Judge, OpenLog, Progressed
+from care_tui.page_names import NAMES, PAGES, STEPS, VIEWS
+from care_tui.pages.logs import LogsPage
+from care_tui.pages.making import make_page
+from care_tui.pages.page import Page
+from care_tui.places import remember
+from care_tui.session import Session
+from care_tui.widgets.answer_bar import AnswerBar
+from care_tui.widgets.filter_bar import FilterBar
+from care_tui.widgets.keys import Keys
+from care_tui.widgets.tab_row import TabRow
+from care_tui.workspace import Workspace
+
+if TYPE_CHECKING:
+    from care_tui.app import CareApp
+
+MIN_WIDTH, MIN_HEIGHT = 60, 20
+WIDE, WIDEST = 120, 160
+"""From these widths on list and text stand side by side, and then cause, proof and fix."""
+ROOMY = 30
+"""From this height on panes have a frame, below it only a line above."""
+STEPS_WIDTH, SHORTEST_NAME = 59, 12
+"""Cells that the tabs of the steps take, and below which the name of a log tells nothing."""
+DIAGNOSIS, PREDICTION = "diagnosis", "prediction"
+
+
+class Place(Record):
+    """Where the operator stood: a page, and the item under the cursor."""
+
+    page: str
+    index: int | None
+
+
+class CaseScreen(Screen[None]):
+    """Turns from page to page, and reads, judges and asks what they want read, judged and asked."""
+
+    AUTO_FOCUS = ""
+    focused: Reactive[Widget | None] = Reactive(None, repaint=False)
+    """Without a repaint of the whole screen: the frames of the panes tell which is focused."""
+    # Textual declares both as instance variables, so they cannot be ClassVar here.
+    HORIZONTAL_BREAKPOINTS = [(0, "-too-narrow"), (MIN_WIDTH, "-narrow"), (WIDE, "-wide"), (WIDEST, "-widest")]  # noqa: RUF012
+    VERTICAL_BREAKPOINTS = [(0, "-too-low"), (MIN_HEIGHT, "-low"), (ROOMY, "-tall")]  # noqa: RUF012
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "back", "Back", key_display="esc", id="page.back"),
+        Binding("slash", "filter", "Filter", show=False, key_display="/", id="page.filter"),
+        *(Binding(page.keys, f"go('{page.name}')", page.title, show=False, id=f"step.{page.name}") for page in STEPS),
+        *(Binding(page.keys, f"go('{page.name}')", page.title, show=False, id=f"view.{page.name}") for page in VIEWS),
+        Binding("L", "go('logs')", "Logs", show=False, id="view.logs"),
+        Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
+        Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
+        Binding("tab", "app.focus_next", "Next pane", show=False, id="screen.next-pane"),
+        Binding("shift+tab", "app.focus_previous", "Previous pane", show=False, id="screen.previous-pane"),
+    ]
+
+    def __init__(self, workspace: Workspace) -> None:
+        super().__init__()
+        self.workspace = workspace
+        self.here = "logs"
+        self._visited: list[Place] = []
+        self._serial = 0
+        """Pages of another log are other pages."""
+
+    def compose(self) -> ComposeResult:
+        too_small = f"Terminal too small: {MIN_WIDTH} x {MIN_HEIGHT} is needed. q quits."
+        yield Static(too_small, id="too-small", markup=False)
+        with Horizontal(id="steps"):
+            yield TabRow(STEPS, id="step-tabs")
+            yield Static(id="log-name", markup=False)
+        yield TabRow(VIEWS, id="view-tabs")
+        yield AnswerBar(self.workspace.glyphs)
+        yield ContentSwitcher(id="pages")
+        yield FilterBar()
+        yield Keys()
+
+    async def on_mount(self) -> None:
+        request = self.workspace.request
+        if request is None or self.workspace.folder is not None:
+            await self._turn_to("logs")
+        else:
+            await self._read(request)
+
+    @property
+    def session(self) -> Session:
+        return self.workspace.session
+
+    # Turning to a page
+
+    @property
+    def page(self) -> Page:
+        """The page in view."""
+        return cast("Page", self.query_one(ContentSwitcher).visible_content)
+
+    def pages(self) -> Iterator[Page]:
+        yield from self.query(Page)
+
+    def _page_id(self, name: str) -> str:
+        return name if name == "logs" else f"{name}-{self._serial}"
+
+    async def _turn_to(
+        self, name: str, index: int | None = None, moment_s: float | None = None, subject: Subject | None = None
+    ) -> None:
+        switcher, id = self.query_one(ContentSwitcher), self._page_id(name)
+        self.query_one(FilterBar).close()
+        if switcher.current is not None:
+            self.page.filter("")
+        is_new = not switcher.query(f"#{id}")
+        if is_new:
+            await switcher.mount(make_page(name, self.workspace, id))
+        self.here = name
+        page = cast("Page", switcher.get_child_by_id(id))
+        if is_new or moment_s is not None or subject is not None:
+            page.look_at(moment_s, subject)
+        batch = ExitStack()
+        batch.enter_context(self.app.batch_update())
+        switcher.current = id
+        page.enter()
+        page.show(index)
+        page.take_focus()
+        self._mark()
+        self.call_later(batch.close)  # when the panes know of their focus: one frame, not one for each
+
+    def _mark(self) -> None:
+        session = self.session
+        empty = session.empty_steps()
+        self.query_one("#step-tabs", TabRow).mark(self.here, empty)
+        self.query_one("#view-tabs", TabRow).mark(self.here, [page.name for page in VIEWS if self._lacks(page.name)])
+        room = self.app.size.width - STEPS_WIDTH
+        name = "" if session.path is None or room < SHORTEST_NAME else clean(session.path.name)
+        if len(name) > room:
+            name = name[: room - 1] + self.workspace.glyphs.more
+        shown = self.query_one("#log-name", Static)
+        if shown.content != name:
+            shown.update(name)
+        self.query_one(AnswerBar).tell(session)
+
+    def _lacks(self, name: str) -> str:
+        """What a page needs that is not there; empty where there is all."""
+        needs, session = PAGES[name].needs, self.session
+        if needs == "nothing" or name in NAMES or session.case is not None:
+            return ""
+        if not session.is_readable:
+            return "Open a log first: L leads to them."
+        return "" if needs == "log" else "This log has no diagnosis; v shows what it holds."
+
+    async def action_go(self, name: str) -> None:
+        """Turn to a page, at the moment and the proof of what is under the cursor."""
+        view = name not in NAMES and name != "logs"
+        page = self.page
+        await self._go(name, page.moment_s() if view else None, page.subject() if view else None)
+
+    async def _go(self, name: str, moment_s: float | None = None, subject: Subject | None = None) -> None:
+        lacks = self._lacks(name)
+        if lacks:
+            self.app.notify(lacks, markup=False)
+        elif name != self.here or moment_s is not None or subject is not None:
+            if name != self.here:
+                self._visited.append(Place(self.here, self.page.index))
+            await self._turn_to(name, None, moment_s, subject)
+
+    async def action_move(self, by: int) -> None:
+        await self._go(NAMES[NAMES.index(self.here) + by])
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        if action == "move":
+            return self.here in NAMES and 0 <= NAMES.index(self.here) + int(str(parameters[0])) < len(NAMES)
+        return True
+
+    @on(Go)
+    async def _wanted(self, event: Go) -> None:
+        event.stop()
+        await self._go(event.page, event.moment_s, event.subject)
+
+    @on(TabRow.Chosen)
+    async def _tab_chosen(self, event: TabRow.Chosen) -> None:
+        event.stop()
+        await self.action_go(event.page)
+        self._mark()
+
+    async def action_back(self) -> None:
+        bar = self.query_one(FilterBar)
+        if bar.words:
+            bar.close()
+            self.page.filter("")
+        elif self.session.state == "loading":
+            self._stop_reading()
+        elif self._visited:
+            place = self._visited.pop()
+            await self._turn_to(place.page, place.index)
+
+    # The filter
+
+    def action_filter(self) -> None:
+        self.query_one(FilterBar).open()
+
+    @on(FilterBar.Typed)
+    def _filter(self, event: FilterBar.Typed) -> None:
+        event.stop()
+        self.page.filter(event.words)
+
+    @on(FilterBar.Closed)
+    def _leave_filter(self, event: FilterBar.Closed) -> None:
+        event.stop()
+        self.page.take_focus()
+
+    # Reading a log
+
+    @on(OpenLog)
+    async def _open(self, event: OpenLog) -> None:
+        event.stop()
+        await self.open_log(event.path)
+
+    async def open_log(self, path: Path) -> None:
+        """Diagnose a log, asked for as the one before; what was chosen for that one is gone."""
+        asked = self.workspace.request
+        # A mission belongs to the log that it was named for.
+        is_other = asked is not None and asked.log.absolute() != path.absolute()
+        request = (
+            Request(path, top=CAUSES)
+            if asked is None
+            else replace(asked, log=path, mission=None if is_other else asked.mission)
+        )
+        await self._read(request)
+
+    @on(Judge)
+    async def _judge(self, event: Judge) -> None:
+        event.stop()
+        await self._read(event.request, page=event.page, objective=event.objective)
+
+    async def _read(self, request: Request, *, page: str = "log", objective: str | None = None) -> None:
+        """Read and judge a log; the operator waits at `page`, and comes back to `objective`."""
+        workspace = self.workspace
+        workspace.request = request
+        workspace.session = Session(path=request.log.absolute(), progress=("starting", 0.0), looked_at=objective)
+        self._visited.clear()
+        old = [one for one in self.pages() if one.id != "logs"]
+        self._serial += 1
+        await self._turn_to(page)
+        for one in old:
+            await one.remove()
+        # After the first frame, which the imports of the work would hold up.
+        self.call_after_refresh(self._start_reading, request)
+
+    def _start_reading(self, request: Request) -> None:
+        self.workers.cancel_group(self, DIAGNOSIS)
+        self.run_worker(lambda: self._diagnose(request), group=DIAGNOSIS, thread=True, exit_on_error=False)
+
+    def _diagnose(self, request: Request) -> None:
+        """In a thread: the answer, and why it could not be put into the history."""
+        worker, engine = get_current_worker(), self.workspace.engine
+
+        def report(step: str, fraction: float) -> None:
+            if worker.is_cancelled:
+                raise CancelledError
+            self.post_message(Progressed(request, step, fraction))
+
+        problem: CareError | None = None
+        try:
+            answer: Case | CareError = engine.diagnose(request, report)
+            remember(request.log)
+            if isinstance(answer, Case):
+                problem = engine.remember(answer.diagnosis, request)
+        except CancelledError:
+            return
+        except Exception as err:
+            answer = as_care_error(err)
+        if not worker.is_cancelled:
+            self.post_message(Answered(DIAGNOSIS, (answer, problem)))
+
+    @on(Progressed)
+    def _show_progress(self, event: Progressed) -> None:
+        event.stop()
+        if self.session.state == "loading" and event.request is self.workspace.request:
+            self.session.progress = (event.step, event.fraction)
+            self.query_one(AnswerBar).tell(self.session)
+
+    @on(Answered)
+    async def _answered(self, event: Answered) -> None:
+        event.stop()
+        if event.question == PREDICTION:
+            self._predicted(event.answer)
+            return
+        answer, problem = event.answer
+        await self._diagnosed(answer)
+        if problem is not None:
+            self.app.notify(clean(problem.message), markup=False)
+
+    async def _diagnosed(self, answer: Case | CareError) -> None:
+        cast("CareApp", self.app).note(answer)
+        if isinstance(answer, CareError):
+            self.session.error = answer
+            self._mark()
+            self.page.show()
+            self.refresh_bindings()
+            return
+        self.session.take(answer)
+        diagnosis = answer.diagnosis
+        verdict = verdict_of(diagnosis)
+        for logs in self.query(LogsPage):
+            logs.learned(answer.log.path if answer.log else self.session.path or Path(), verdict.status, verdict.failed)
+        # What happened is the answer where no profile fits, or a part of it that comes first where one failed.
+        stays = diagnosis.profile.fit.verdict == "no" or _has_failed_part(diagnosis.health)
+        if self.here == "log" and not stays:
+            await self._go("objectives")
+        else:
+            self.page.enter()
+            self._mark()
+            self.page.show()
+            self.refresh_bindings()
+
+    def _stop_reading(self) -> None:
+        self.workers.cancel_group(self, DIAGNOSIS)
+        self.session.error = CareError("The diagnosis was stopped.", hint="r starts it again, o opens another log.")
+        cast("CareApp", self.app).note(self.session.error)
+        self._mark()
+        self.page.show()
+        self.refresh_bindings()
+
+    # What was decided
+
+    @on(Decided)
+    def _decide(self, event: Decided) -> None:
+        """Tell what follows from the boxes and the causes as they are now."""
+        event.stop()
+        session, engine = self.session, self.workspace.engine
+        if event.has_changed_fix and session.case is not None:
+            session.fix = session.fix_error = None
+            changes, case = dict(session.basket.ticked), session.case
+            self.workers.cancel_group(self, PREDICTION)
+            self.run_worker(lambda: self._predict(lambda: engine.predict(case, changes)), group=PREDICTION, thread=True)
+        with self.app.batch_update():
+            self.query_one(AnswerBar).tell(session)
+            self.page.show()
+
+    def _predict(self, predict: Callable[[], Fix]) -> None:
+        worker = get_current_worker()
+        try:
+            answer: Fix | CareError = predict()
+        except Exception as err:
+            answer = as_care_error(err)
+        if not worker.is_cancelled:
+            self.post_message(Answered(PREDICTION, answer))
+
+    def _predicted(self, answer: Fix | CareError) -> None:
+        if isinstance(answer, CareError):
+            self.session.fix_error = answer
+        else:
+            self.session.fix = answer
+        with self.app.batch_update():
+            self.query_one(AnswerBar).tell(self.session)
+            self.page.enter()
+            self.page.show_text()
+
+
+def _has_failed_part(health: Health) -> bool:
+    """Whether something failed that would stop a mission, before it was down."""
+    return any(one.severity == "critical" and not one.after_impact for one in health.findings)

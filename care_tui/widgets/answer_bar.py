@@ -1,0 +1,35 @@
+"""The answer of the run, pinned under the tabs of every page."""
+
+from __future__ import annotations
+
+from textual.widgets import Static
+
+from care_tui.render.answer import answer_lines
+from care_tui.render.rows import Glyphs, joined
+from care_tui.session import Session
+
+
+class AnswerBar(Static):
+    """Lines that are cut off at the width, never wrapped."""
+
+    def __init__(self, glyphs: Glyphs) -> None:
+        super().__init__(markup=False)
+        self._glyphs = glyphs
+        self._session = Session()
+
+    def tell(self, session: Session) -> None:
+        """Show where this session stands."""
+        self._session = session
+        self._draw()
+
+    def on_resize(self) -> None:
+        self._draw()
+
+    def _draw(self) -> None:
+        width = self.content_size.width or self.app.size.width - 2
+        lines = answer_lines(self._session, self._glyphs, width, is_low=self.app.size.height < 24)
+        more = self._glyphs.more
+        cut = [line.truncate(width - 1) + more if line.cell_length > width else line for line in lines]
+        content = joined(cut, "\n")
+        if content != self.content:
+            self.update(content, layout=content.plain.count("\n") != str(self.content).count("\n"))
