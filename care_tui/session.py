@@ -97,7 +97,7 @@ class Session(Struct, eq=False):
 
     def hypotheses(self) -> tuple[Hypothesis, ...]:
         """What explains the failure, the causes set aside left out and the others weighed anew."""
-        return weighed_without(self.diagnosis.hypotheses, self.dismissed)
+        return weighed_without(self.diagnosis, self.dismissed).hypotheses
 
     def odds_unchanged(self) -> float | None:
         """Probability that the next run is without a fault as driven; None where that is not known."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
     from care_core.configs.loading import ConfigFile
     from care_core.diagnose.judging import Judged
-    from care_core.diagnose.records import Diagnosis, Fix, Hypothesis
+    from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.reference import Good
     from care_core.ecosystems.base import RunModel
     from care_core.ecosystems.findings import Health
@@ -377,7 +377,7 @@ def decided(diagnosis: Diagnosis, fix: Fix | None, dismissed: Mapping[str, str])
     from care_core.diagnose.records import Dismissal
 
     aside = tuple(Dismissal(option, reason) for option, reason in dismissed.items())
-    diagnosis = replace(diagnosis, hypotheses=weighed_without(diagnosis.hypotheses, dismissed))
+    diagnosis = weighed_without(diagnosis, dismissed)
     if fix is None or not fix.changes:
         return replace(diagnosis, fix=None, alternatives=fixes(diagnosis), dismissed=aside)
     wanted = changes_of(fix)
@@ -385,13 +385,14 @@ def decided(diagnosis: Diagnosis, fix: Fix | None, dismissed: Mapping[str, str])
     return replace(diagnosis, fix=fix, alternatives=others, dismissed=aside)
 
 
-def weighed_without(hypotheses: Sequence[Hypothesis], dismissed: Collection[str]) -> tuple[Hypothesis, ...]:
-    """What explains the failure, given that these parameters do not: one of the others does, in the same proportion."""
-    left = [one for one in hypotheses if one.what != "parameter" or one.name not in dismissed]
-    total = sum(one.probability for one in left)
-    if len(left) == len(hypotheses) or not total:
-        return tuple(hypotheses)
-    return tuple(replace(one, probability=one.probability / total) for one in left)
+def weighed_without(diagnosis: Diagnosis, dismissed: Collection[str]) -> Diagnosis:
+    """The diagnosis with what explains the failure, given that these parameters do not."""
+    from care_core.diagnose.hypotheses import hypotheses_of
+
+    if diagnosis.failure is None or not dismissed:
+        return diagnosis
+    left = diagnosis.failure.without(dismissed)
+    return replace(diagnosis, failure=left, hypotheses=hypotheses_of(left))
 
 
 def changes_of(fix: Fix) -> dict[str, float]:

@@ -46,6 +46,10 @@ class NoisyOr(Record):
         kept = math.prod(1.0 - self._share(key) for key in self.loses if key in keys)
         return min(1.0, (1.0 - kept) / self.failed)
 
+    def without(self, names: Container[str]) -> NoisyOr:
+        """The same where these parameters are known not to have acted."""
+        return NoisyOr({key: q for key, q in self.loses.items() if key[0] != "parameter" or key[1] not in names})
+
     def ranking(self) -> dict[Key, float]:
         """Per cause, the likeliest first, the probability that it acted and none above it did; they add up to 1."""
         order = sorted(self.loses, key=lambda key: (-self._share(key), key))

@@ -137,5 +137,5 @@ def hypothesis_rows(one: Hypothesis, finding: Finding | None, notes: Sequence[st
     rows = [] if finding is None else [*finding_rows(finding), Row(Content())]
     if one.what in ("hardware", "world"):
         rows.append(warning("Not a parameter", "if this is the cause, changing parameters will not help"))
-    said = [warning("Note", note) for note in notes if one.what == "parameter" and one.name in note]
+    said = [warning("Note", note) for note in notes if one.what == "parameter" and one.name and one.name in note]
     return [labelled("Probability", percent(one.probability)), *said, *rows]

@@ -52,6 +52,15 @@ def test_a_repair_holds_as_often_as_in_missions_that_are_drawn_again(gone: tuple
     assert CAUSES.repaired(gone) == pytest.approx((~stays)[lost].mean(), abs=0.005)
 
 
+def test_a_parameter_that_is_set_aside_leaves_the_others_what_they_are_in_missions_without_it() -> None:
+    acts, lost = drawn(CAUSES)
+    lost = lost & ~acts[A]
+    left = CAUSES.without({"a"})
+    for key in (B, C, CHANCE):
+        assert left.acts(key) == pytest.approx(acts[key][lost].mean(), abs=0.005)
+    assert left.acts(A) == 0.0
+
+
 @given(losing)
 def test_a_ranking_adds_up_to_one_in_order(loses: dict[Key, float]) -> None:
     shares = list(NoisyOr(loses).ranking().values())

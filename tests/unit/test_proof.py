@@ -13,7 +13,8 @@ from care_core.application.plotting import drawn_of, ranked
 from care_core.application.proof import proof_of
 from care_core.application.signals import settled_s, trace_of
 from care_core.application.track import way_of
-from care_core.diagnose.records import Hypothesis
+from care_core.diagnose.hypotheses import hypotheses_of
+from care_core.diagnose.noisy_or import CHANCE, NoisyOr
 from care_core.ecosystems.findings import Event, Finding, Health, every_finding
 from care_core.errors import CareError
 from care_core.files import bundled
@@ -95,9 +96,13 @@ def test_the_way_is_in_metres_with_the_corners_that_were_asked_for() -> None:
         way_of(Case(sample.unfitting(), log=MadeLog({"ATT": {"Roll": T}})))
 
 
-def test_a_cause_set_aside_leaves_the_others_in_proportion() -> None:
-    weighed = (Hypothesis("parameter", "A", 0.6), Hypothesis("parameter", "B", 0.3), Hypothesis("chance", "", 0.1))
-    left = weighed_without(weighed, {"A"})
-    assert [(one.name, round(one.probability, 2)) for one in left] == [("B", 0.75), ("", 0.25)]
-    assert weighed_without(weighed, {"C"}) == weighed
-    assert weighed_without(weighed[:1], {"A"}) == weighed[:1], "something has to explain it"
+def test_a_cause_set_aside_has_the_others_weighed_anew() -> None:
+    causes = NoisyOr({("parameter", "A"): 0.9, ("parameter", "B"): 0.6, CHANCE: 0.1})
+    weighed = replace(sample.faulty(), failure=causes, hypotheses=hypotheses_of(causes))
+    assert [one.name for one in weighed.hypotheses][:2] == ["A", "B"]
+    left = weighed_without(weighed, {"A"}).hypotheses
+    assert left[0].name == "B"
+    assert left[0].acts > 5 * weighed.hypotheses[1].probability
+    assert sum(one.probability for one in left) == pytest.approx(1.0)
+    assert weighed_without(weighed, ()) == weighed
+    assert weighed_without(sample.faulty(), {"A"}) == sample.faulty()
