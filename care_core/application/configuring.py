@@ -201,7 +201,7 @@ def apply_to_files(case: Case, fix: Fix) -> list[tuple[Path, Path]]:
     where the old ones are. Raises ConfigError."""
     from care_core.configs.writing import replace_with_backup
 
-    changed = [file for file in edited_by(case, fix) if file.edits]
+    changed = [file for file in edited_by(case, fix) if file.after != file.before]
     return [(file.path, replace_with_backup(file)) for file in changed]
 
 

@@ -14,6 +14,7 @@ from care_core.ecosystems.ranking import LIKELY
 from care_core.records import replace
 from care_core.run import FitVerdict
 from care_core.text import log_time
+from care_core.variables import Change
 
 TOLD_APART = 4.0
 """How many times likelier good runs have to be with the change than without for it to be known that it works."""
@@ -33,7 +34,16 @@ def promised(fixes: Sequence[Fix], promise: Promise) -> tuple[Fix, ...]:
     driven = promise.query.config
     configs = [{**driven, **{one.option.name: one.suggested for one in fix.changes}} for fix in fixes]
     odds = map(float, promise.odds(configs))
-    return tuple(replace(fix, p_fixed=share) for fix, share in zip(fixes, odds, strict=True))
+    return tuple(
+        replace(fix, p_fixed=share, changes=_likeliest_first(fix, promise))
+        for fix, share in zip(fixes, odds, strict=True)
+    )
+
+
+def _likeliest_first(fix: Fix, promise: Promise) -> tuple[Change, ...]:
+    """The changes in the order of how likely what they change acted: of several the first is the one that is read."""
+    acts = {one.option.name: promise.failure.acts(("parameter", one.option.name)) for one in fix.changes}
+    return tuple(sorted(fix.changes, key=lambda one: -round(acts[one.option.name], 2)))
 
 
 def promised_causes(faults: Sequence[Fault], promise: Promise) -> tuple[Fault, ...]:

@@ -23,6 +23,9 @@ CHANCE: Key = ("chance", "")
 """What went wrong in this run without any of the other causes."""
 UNKNOWN: Key = ("parameter", "")
 """A parameter that the profile does not know."""
+ALIKE = 0.05
+"""Of causes that are as likely as each other to this, a part that failed is told first: it is mended before anything
+is changed."""
 MOST = 0.99
 """No cause is surer than this to lose a mission by itself."""
 
@@ -52,7 +55,7 @@ class NoisyOr(Record):
 
     def ranking(self) -> dict[Key, float]:
         """Per cause, the likeliest first, the probability that it acted and none above it did; they add up to 1."""
-        order = sorted(self.loses, key=lambda key: (-self._share(key), key))
+        order = sorted(self.loses, key=lambda key: (-self._share(key) - self._first(key), key))
         told: dict[Key, float] = {}
         above = 1.0
         for key in order:
@@ -70,6 +73,9 @@ class NoisyOr(Record):
         by_causes = (1.0 - chance) * left - self._kept(())
         by_luck = (1.0 - REPEATS.value) * chance * left
         return min(1.0, max(0.0, (by_causes + by_luck) / self.failed))
+
+    def _first(self, key: Key) -> float:
+        return ALIKE if key[0] == "hardware" and self._share(key) >= 0.5 else 0.0
 
     def _share(self, key: Key) -> float:
         return min(self.loses.get(key, 0.0), MOST)

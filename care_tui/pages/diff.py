@@ -101,11 +101,14 @@ class DiffPage(DiagnosisPage):
         self.enter()
         self.show()
 
-    def _ask_for_file(self) -> None:
+    def _ask_for_file(self, *, to_apply: bool = False) -> None:
+        title = "Apply to which file?" if to_apply else "Compare with which file?"
         hint = "The robot's configuration, for ROS also NAMESPACE=FILE. Enter takes it, Esc cancels."
-        self.app.push_screen(Prompt("Compare with the file", f"{Path().absolute()}/", hint, _not_a_file), self._named)
+        self.app.push_screen(
+            Prompt(title, f"{Path().absolute()}/", hint, _not_a_file), lambda typed: self._named(typed, to_apply)
+        )
 
-    def _named(self, typed: str | None) -> None:
+    def _named(self, typed: str | None, to_apply: bool) -> None:
         if typed is None or self.session.case is None:
             return
         namespace, sign, path = typed.rpartition("=")
@@ -114,6 +117,8 @@ class DiffPage(DiagnosisPage):
         if self.workspace.request is not None:
             self.workspace.request = replace(self.workspace.request, configs=(name,))
         self._turn("file")
+        if to_apply:
+            self.action_apply()
 
     def action_apply(self) -> None:
         """Put the change into the operator's file, once that is confirmed; the old one is kept beside."""
@@ -121,7 +126,7 @@ class DiffPage(DiagnosisPage):
         if case is None or fix is None or not fix.changes or self.session.only_asked:
             self.say(self.session.only_asked or "No change is ticked in the fix (4).")
         elif not case.configs:
-            self._ask_for_file()
+            self._ask_for_file(to_apply=True)
         else:
             files = ", ".join(str(name) for name in case.configs)
             question = f"Put {len(fix.changes)} change{'s' if len(fix.changes) > 1 else ''} into {files}?"

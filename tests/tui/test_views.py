@@ -184,13 +184,14 @@ async def test_the_change_is_put_into_the_file_that_is_asked_for_and_the_old_one
         assert "no such file" in str(app.screen.query_one(".error", Static).content)
         app.screen.query_one(Input).value = str(file)
         await settle(pilot, "enter")
-        assert "+LAND_SPEED,40  # slow" in text(app)
-        await settle(pilot, "A")
-        assert isinstance(app.screen, Confirm)
+        assert isinstance(app.screen, Confirm), "the file that it is to be applied to was asked for"
         await settle(pilot, "n")
+        assert "+LAND_SPEED,40  # slow" in text(app)
         assert file.read_text() == before, "nothing is written unasked"
         await settle(pilot, "A", "y")
         assert "the old one is robot.param.bak" in app.title
+        await settle(pilot, "A", "y")
+        assert "holds these values already" in app.title
     assert file.read_text() == before.replace("16", "40")
     assert (tmp_path / "robot.param.bak").read_text() == before
 

@@ -78,6 +78,12 @@ def test_a_repair_is_worth_no_more_than_what_it_takes_away_explains(loses: dict[
         assert better <= 1.0 - max((model.acts(other) for other in (A, B, C) if other != key), default=0.0) + 1e-9
 
 
+def test_a_part_that_is_about_as_likely_as_a_parameter_is_told_first() -> None:
+    assert list(NoisyOr({A: 0.88, B: 0.87}).ranking()) == [B, A]
+    assert list(NoisyOr({A: 0.95, B: 0.87}).ranking()) == [A, B]
+    assert list(NoisyOr({A: 0.12, B: 0.1}).ranking()) == [A, B]
+
+
 def test_a_run_that_nothing_explains_is_not_promised() -> None:
     assert NoisyOr({CHANCE: 0.0}).repaired(()) == 0.0
     assert NoisyOr({}).acts(A) == 0.0

@@ -65,7 +65,7 @@ def test_a_plot_says_in_words_what_it_shows() -> None:
     svg = next(figure.iter("svg"))
     assert svg.get("role") == "img"
     told = next(one.text or "" for one in figure.iter("desc"))
-    for part in ("from the start of the log", "Alt: 1 to 9 m", "ceiling: 8 m", "motor 4 lost thrust from 1.0 s"):
+    for part in ("from the start of the mission", "Alt: 1 to 9 m", "ceiling: 8 m", "motor 4 lost thrust from 1.0 s"):
         assert part in told
     assert [one.text for one in figure.iter("span") if "sign" in one.get("class", "")] == ["1", "2"]
     assert "ceiling: 8 m" in [one.text for one in figure.iter("span")]
