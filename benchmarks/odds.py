@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -218,6 +219,7 @@ def main() -> None:
     parser.add_argument("folders", nargs="+", type=Path, help="folders with truth.jsonl and logs")
     parser.add_argument("--most", type=int, default=10**9, help="so many failures of each")
     asked = parser.parse_args()
+    os.environ["CARE_HISTORY"] = "off"  # simulated vehicles share a name, and a run of one is no good run of another
     for folder in asked.folders:
         show(folder, judge(folder, asked.most))
 
