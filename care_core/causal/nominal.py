@@ -342,6 +342,39 @@ def drive_full_throttle_speed(given: Given) -> FloatArray:
     return np.where(given["steering_kind"] > 0, 4.0, 19.6)
 
 
+# --- planes: legs at an airspeed, circles, a landing ------------------------------------------------------------
+
+_PLANE = ("speed", "least_speed", "most_speed")
+_PLANE_MISSION = (*_PLANE, "path_length", "loiter_turns", "loiter_radius", "hold_time", "returns", "return_distance")
+_PLANE_ENDS_S = 30.0
+"""Take-off run, flare, roll-out and disarming."""
+
+
+@formula(*_PLANE)
+def plane_airspeed(given: Given) -> FloatArray:
+    """The airspeed that is asked for: no less than the least, no more than the largest."""
+    return np.asarray(np.maximum(np.minimum(given["speed"], given["most_speed"]), given["least_speed"]))
+
+
+@formula(*_PLANE_MISSION)
+def plane_mission_time(given: Given) -> FloatArray:
+    """Arming to disarming: the legs, the way home and the circles at the wanted airspeed, without wind."""
+    circles = given["loiter_turns"] * 2 * np.pi * np.abs(given["loiter_radius"])
+    way = given["path_length"] + circles + given["returns"] * given["return_distance"]
+    return np.asarray(_PLANE_ENDS_S + given["hold_time"] + way / np.maximum(plane_airspeed(given), 1.0))
+
+
+@formula(*_PLANE_MISSION, "level_power")
+def plane_energy(given: Given) -> FloatArray:
+    """Wh: the power of level flight, which grows with the cube of the airspeed, all the time."""
+    power = given["level_power"] * (plane_airspeed(given) / _POWER_AT_MS) ** 3
+    return np.asarray(power * plane_mission_time(given) / 3600)
+
+
+_POWER_AT_MS = 22.0
+"""Airspeed for which `level_power` is given."""
+
+
 # --- robots on goals: driven from one to the next, turned at each --------------------------------------------------
 
 # What the goals of training took at the reference configuration of move_base (0.5 m/s, 1 rad/s): the way at full speed,

@@ -30,6 +30,8 @@ EXPLAINS: Explains = {
     "gps": frozenset(("estimator", "attitude", "crash", "prearm")),  # position control leans after a false position
     "compass": frozenset(("estimator", "attitude", "crash", "prearm")),  # a false heading steers the wrong way
     "barometer": frozenset(("estimator", "thrust", "crash", "prearm")),  # a false height
+    "airspeed": frozenset(("estimator", "attitude", "thrust", "crash", "prearm")),  # it flies too slow, or too fast
+    "surface": frozenset(("tuning", "vibration", "thrust", "attitude", "takeoff", "airspeed", "motor", *_TUMBLES)),
     "estimator": frozenset(("attitude", "crash", "prearm")),
     "tuning": frozenset(("vibration", "thrust", "estimator", "attitude", "takeoff", "crash")),
     "takeoff": frozenset(("attitude", "motor", "compass", "tuning", *_TUMBLES)),  # motors run on against the ground

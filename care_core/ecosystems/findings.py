@@ -20,6 +20,8 @@ FindingKind = Literal[
     "imu",
     "battery",
     "radio",
+    "airspeed",
+    "surface",
     "attitude",
     "tuning",
     "takeoff",

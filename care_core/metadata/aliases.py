@@ -16,7 +16,7 @@ from care_core.records import Record
 Version = tuple[int, ...]
 _FIRST: Version = (0,)
 _47, _471 = (4, 7), (4, 7, 1)
-_36, _34, _33, _35, _42, _46 = (3, 6), (3, 4), (3, 3), (3, 5), (4, 2), (4, 6)
+_36, _34, _33, _35, _42, _45, _46 = (3, 6), (3, 4), (3, 3), (3, 5), (4, 2), (4, 5), (4, 6)
 
 
 class ParameterAlias(Record):
@@ -135,6 +135,20 @@ def _of_quadplane() -> Iterator[Chain]:
     yield _chain("Q_ANGLE_MAX", (_47, "Q_A_ANGLE_MAX", 0.01))
 
 
+def _of_plane() -> Iterator[Chain]:
+    """What Plane 4.5 renamed, from centimetres and hundredths of a degree to metres and degrees where it says so
+    (ArduPlane/Parameters.cpp and the parameter lists of 4.4 and 4.5)."""
+    for old, new, scale in (
+        ("TRIM_ARSPD_CM", "AIRSPEED_CRUISE", 0.01), ("ARSPD_FBW_MIN", "AIRSPEED_MIN", 1.0),
+        ("ARSPD_FBW_MAX", "AIRSPEED_MAX", 1.0), ("MIN_GNDSPD_CM", "MIN_GROUNDSPEED", 0.01),
+        ("LIM_ROLL_CD", "ROLL_LIMIT_DEG", 0.01), ("LIM_PITCH_MAX", "PTCH_LIM_MAX_DEG", 0.01),
+        ("LIM_PITCH_MIN", "PTCH_LIM_MIN_DEG", 0.01), ("TRIM_PITCH_CD", "PTCH_TRIM_DEG", 0.01),
+        ("ALT_HOLD_RTL", "RTL_ALTITUDE", 0.01), ("ALT_HOLD_FBWCM", "CRUISE_ALT_FLOOR", 0.01),
+        ("LAND_PITCH_CD", "LAND_PITCH_DEG", 0.01), ("Q_LAND_SPEED", "Q_LAND_FINAL_SPD", 0.01),
+    ):  # fmt: skip
+        yield _chain(old, (_45, new, scale))
+
+
 def _of_all() -> Iterator[Chain]:
     for old, new in (("SYSID_THISMAV", "MAV_SYSID"), ("SYSID_MYGCS", "MAV_GCS_SYSID"),
                      ("TELEM_DELAY", "MAV_TELEM_DELAY"), ("EK3_MAX_FLOW", "EK3_FLOW_MAX")):  # fmt: skip
@@ -155,13 +169,14 @@ def _of_all() -> Iterator[Chain]:
 
 
 _FAMILIES: Mapping[str, tuple[str, ...]] = {
-    "copter": ("copter", "all"), "heli": ("copter", "all"), "quadplane": ("quadplane", "all"),
+    "copter": ("copter", "all"), "heli": ("copter", "all"), "plane": ("plane", "all"),
+    "quadplane": ("plane", "quadplane", "all"),
 }  # fmt: skip
 
 
 @cache
 def _chains(kind: str) -> Mapping[str, Chain]:
-    made = {"copter": _of_copter, "quadplane": _of_quadplane, "all": _of_all}
+    made = {"copter": _of_copter, "plane": _of_plane, "quadplane": _of_quadplane, "all": _of_all}
     found = [chain for family in _FAMILIES.get(kind, ("all",)) for chain in made[family]()]
     return {alias.name: chain for chain in found for alias in chain}
 

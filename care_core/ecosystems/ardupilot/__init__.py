@@ -33,6 +33,7 @@ class ArduPilot(Ecosystem):
         "care_core.ecosystems.ardupilot.measures.rover",
         "care_core.ecosystems.ardupilot.measures.route",
         "care_core.ecosystems.ardupilot.measures.signals",
+        "care_core.ecosystems.ardupilot.measures.winged",
     )
 
     def model(self, log: Log) -> RunModel:

@@ -64,6 +64,8 @@ _FAST_MS, _STILL = 5.0, 2.0
 """A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
 _SIMULATED_HIT = re.compile(r"SIM Hit ground at (\d+(?:\.\d+)?) m/s")
 _WINGED = frozenset(("plane", "quadplane"))
+_TAXIES_MS = 8.0
+"""Faster over ground, a plane flies or is about to; against a gale its height tells."""
 _TUMBLING_DEG, _TUMBLES_S = 45.0, 2.0
 _ROLLS = frozenset((UNKNOWN_MODE, 0, 3, 4, 23))
 """Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; any where the log does not say."""
@@ -85,7 +87,10 @@ class Airborne(Armed):
 
     @cached_property
     def airborne(self) -> tuple[Span, ...]:
-        """Spans in the air: armed, and higher than a metre or lifted by more than half of what hovering takes."""
+        """Spans in the air: armed, and higher than a metre or lifted by more than half of what hovering takes; of a
+        plane, higher than two metres or faster than it taxies."""
+        if self.kind in _WINGED:
+            return self._on_wings
         if not self.is_copter:
             return self.armed
         throttle, height = self.throttle, self.height
@@ -104,6 +109,17 @@ class Airborne(Armed):
         for start, end in self.armed:
             spans += runs(t, up & (t >= start) & (t <= end), gap_s=3.0)
         return tuple((a, b) for a, b in spans if b - a >= 1.0)
+
+    @property
+    def _on_wings(self) -> tuple[Span, ...]:
+        moved, height = self.one("GPS", "Spd"), self.height
+        if moved is None and height is None:
+            return self.armed
+        t = moved.t if moved is not None else height[0]  # type: ignore[index]
+        up = np.zeros(len(t), dtype=bool) if moved is None else moved["Spd"] > _TAXIES_MS
+        if height is not None:
+            up |= np.interp(t, *height) > _GROUND_M
+        return tuple(span for span in runs(t, up & during(self.armed, t), gap_s=3.0) if span[1] - span[0] >= 1.0)
 
     @cached_property
     def stranded(self) -> Span | None:
@@ -210,11 +226,10 @@ class Airborne(Armed):
     @cached_property
     def _tumbled_s(self) -> float | None:
         """When a plane left its demand for good, to turn over, in a mode that levels it."""
-        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
-        off_demand = self.lean_error
-        if table is None or off_demand is None:
+        if self._lean_error is None:
             return None
-        t, error = off_demand
+        table, error = self._lean_error
+        t = table.t
         levels = ~np.isin(self.modes_at(t), tuple(_ROLLS))
         off = (error > _TUMBLING_DEG) & levels & during(self.armed, t)
         over = t[(np.abs(table["Roll"]) > UPSIDE_DOWN_DEG) & off]

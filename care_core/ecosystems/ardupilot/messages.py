@@ -121,6 +121,7 @@ _FLIGHT: Dictionary = {
             "ThO": Field(label="throttle, 0 to 1", former=("ThrOut",)),
             "ThI": Field(former=("ThrIn",)),
             "ThrOut": Field(label="throttle"),
+            "As": Field("m/s", "airspeed", former=("Aspd",)),
         },
         **_set(16, "control tuning"),
     ),
@@ -133,7 +134,25 @@ _FLIGHT: Dictionary = {
         "LatAcc": Field("m/s2", "lateral acceleration"),
     }),
     "THR": Message({"Speed": Field("m/s", "speed"), "ThrOut": Field("%", "throttle output")}),
-    "NTUN": Message({name: _placed("", "") for name in ("DPosX", "DPosY", "PosX", "PosY")}),
+    "NTUN": Message({
+        **{name: _placed("", "") for name in ("DPosX", "DPosY", "PosX", "PosY")},
+        "AltE": Field("m", "height error"),
+        "XT": Field("m", "distance from the line"),
+        "TAsp": Field("m/s", "airspeed wanted"),
+    }),
+    "TECS": Message({
+        "h": Field("m", "height"),
+        "hdem": Field("m", "height wanted"),
+        "dh": Field("m/s", "climb rate"),
+        "dhdem": Field("m/s", "climb rate wanted"),
+        "sp": Field("m/s", "airspeed"),
+        "spdem": Field("m/s", "airspeed wanted"),
+    }),
+    "AETR": Message({
+        "Ail": Field(label="ailerons, -4500 to 4500"),
+        "Elev": Field(label="elevator, -4500 to 4500"),
+        "Thr": Field("%", "throttle"),
+    }),
     "AHR2": Message(_PLACE),
     "ORGN": Message(
         {"Lat": _placed("deg", "latitude", _LATITUDE), "Lng": _placed("deg", "longitude", _LONGITUDE)},
@@ -201,6 +220,7 @@ _SENSORS: Dictionary = {
     "RFND": Message({"Dist": Field("m", former=("Dist1",))}, instance="Instance"),
     "ESC": Message({"RPM": Field("1/min")}, instance="Instance"),
     "XKF1": Message({}, ("NKF1", "EKF1", "NKF6"), "C"),
+    "XKF2": Message({"VWN": Field("m/s", "wind north"), "VWE": Field("m/s", "wind east")}, ("NKF2", "NKF7"), "C"),
     "XKF3": Message(
         {
             "IVN": Field("m/s", "velocity innovation north"),

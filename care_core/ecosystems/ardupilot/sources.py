@@ -69,6 +69,7 @@ SOURCES = (
          _ANY, is_optional=True, mission_lost=ASIDE),
 )  # fmt: skip
 _FIX = 3
+_SAME_THROTTLE = 0.03
 _METRES = 111_319.5
 _ZEROS: Mapping[str, tuple[FindingKind, str, tuple[str, ...]]] = {
     "MAG": ("compass", "compass", ("MagX", "MagY", "MagZ")),
@@ -102,6 +103,8 @@ def frozen(flight: Armed, moving: Sequence[Span], sources: Sequence[Live] = SOUR
                 columns = [own[field] for field in fields]
                 yield from (Frozen(source, name, *one, None) for one in numberless(own.t, columns, source))
             for span, count in repeats(own.t, [own[field] for field in fields], source):
+                if source.message == "BAT" and _holds_its_throttle(flight, span):
+                    continue  # one throttle takes one current, and moves no sensor that counts in steps
                 for part in overlaps(span, moving, source.seconds):
                     motion = motion_of(flight, part, source.message)
                     if motion.reaches(source.moved):
@@ -110,6 +113,15 @@ def frozen(flight: Armed, moving: Sequence[Span], sources: Sequence[Live] = SOUR
                             told.append(one)
                             yield one
                         break
+
+
+def _holds_its_throttle(flight: Armed, span: Span) -> bool:
+    """Whether a vehicle on wheels or wings kept its throttle all the while."""
+    if flight.is_copter or flight.throttle is None:
+        return False
+    t, throttle = flight.throttle
+    held = throttle[(t >= span[0]) & (t <= span[1])]
+    return len(held) > 1 and float(np.ptp(held)) < _SAME_THROTTLE
 
 
 def unconnected(flight: Armed, hovering: Sequence[Span]) -> Iterator[Unconnected]:

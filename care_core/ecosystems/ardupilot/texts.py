@@ -21,7 +21,7 @@ _ROUTINE = re.compile(
     """,
     re.VERBOSE,
 )
-_MISSION = re.compile(r"(?:Mission: (\d+) (.+)|Reached (?:command|waypoint) #(\d+))")
+_MISSION = re.compile(r"(?:Mission: (\d+) (.+)|(?:Reached (?:command|waypoint)|Passed waypoint) #(\d+))")
 _REFUSAL = re.compile(r"(?P<before>Pre)?Arm: (?P<why>.*)")
 RECORDED = {
     11: re.compile(r"GPS Glitch|Glitch cleared", re.IGNORECASE),

@@ -29,6 +29,7 @@ from care_core.ecosystems.ardupilot.checks import (
     way_home,
 )
 from care_core.ecosystems.ardupilot.checks.settings import charge, driven, heading, hover, level, outputs, supply
+from care_core.ecosystems.ardupilot.checks.wings import airspeed, propeller, surfaces
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -40,6 +41,9 @@ CHECKS: tuple[Check[Flight], ...] = (
     charge.CHECK,
     driven.CHECK,
     outputs.CHECK,
+    airspeed.CHECK,
+    propeller.CHECK,
+    surfaces.CHECK,
     attitude.CHECK,
     barometer.CHECK,
     battery.CHECK,

@@ -9,7 +9,7 @@ axis.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from care_core.ecosystems.ardupilot.statistics import (
     calibrated_probability,
     lasting,
     length,
+    records,
     smooth,
 )
 from care_core.ecosystems.base import Check, Limits
@@ -65,6 +66,14 @@ _LOST = LIMITS.add(
     "probability that noise costs the mission", 0.15, "",
     "4 of 10 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
 )  # fmt: skip
+_OF_CHANGE = LIMITS.add(
+    "difference of a plane's gyros, as a share of its rates' change", 0.06, "", "a choice: see above"
+)
+_ERRORS = LIMITS.add("standard errors by which a plane's sensors differ by chance", 4.0, "", "a choice")
+_PLANE_SHAKEN_DPS = LIMITS.add(
+    "turning to and fro at which a plane's gyros are not compared", 12.0, "deg/s", "a choice"
+)
+_WINGED = ("plane", "quadplane")
 _FAILED = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
 _APART = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
 
@@ -110,8 +119,9 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     noise = np.min([smooth(t, np.abs(axis - smooth(t, axis, 5.0)), 8.0) for axis in apart], axis=0)
     offset = np.max([np.abs(smooth(t, axis, _OFFSET_OVER_S)) for axis in apart], axis=0)
     vibration = _vibration(flight, t)
-    limit = NOISE_DPS + _DPS_PER_VIBE * vibration + _turning(sensors[0])
-    over = np.maximum(noise / limit, np.where(_shaken(sensors[0]), 0.0, offset / OFFSET_DPS))
+    limit = NOISE_DPS + _DPS_PER_VIBE * vibration + _turning(sensors[0]) + _at_another_moment(flight, sensors[0])
+    chance = _of_a_mean(flight, t, apart, _OFFSET_OVER_S)
+    over = np.maximum(noise / limit, np.where(_shaken(flight, sensors[0]), 0.0, offset / (OFFSET_DPS + chance)))
     spans = lasting(t, over > 1.0, _LASTS_S, gap_s=3.0)
     if not spans:
         return
@@ -140,6 +150,24 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     )
 
 
+def _at_another_moment(flight: Flight, table: Table) -> Floats:
+    """What a plane's turning adds, degrees/s: it rolls and pitches all the time, and two gyros are not recorded at the
+    same moment."""
+    if flight.kind not in _WINGED:
+        return np.zeros(len(table))
+    changes = length(np.diff(table[axis], prepend=table[axis][:1]) for axis in GYROS)
+    return _OF_CHANGE * smooth(table.t, np.degrees(changes), 8.0)
+
+
+def _of_a_mean(flight: Flight, t: Floats, differences: Sequence[Floats], width_s: float) -> Floats:
+    """By how much the means of two sensors of a plane differ by chance, its frame shaking between their records: so
+    many standard errors."""
+    if flight.kind not in _WINGED:
+        return np.zeros(len(t))
+    spread = sum(smooth(t, one**2, width_s) - smooth(t, one, width_s) ** 2 for one in differences)
+    return np.asarray(_ERRORS * np.sqrt(np.maximum(spread, 0.0) / records(t, width_s)))
+
+
 def _turning(table: Table) -> Floats:
     """What turning fast adds, degrees/s: a flip, a roll or a tumble shows the scale and delay of each sensor."""
     rate = smooth(table.t, np.degrees(length(table[axis] for axis in GYROS)), 8.0)
@@ -153,10 +181,11 @@ def _beginning(t: Floats, over: Floats, span: Span) -> float:
     return min([span[0], *before])
 
 
-def _shaken(table: Table) -> Mask:
+def _shaken(flight: Flight, table: Table) -> Mask:
     """Where the vehicle turns to and fro so fast that two gyros cannot be compared record by record."""
     rates = length(np.abs(table[axis] - smooth(table.t, table[axis], 5.0)) for axis in GYROS)
-    return np.asarray(smooth(table.t, np.degrees(rates), 8.0) > _SHAKEN_DPS)
+    limit = _PLANE_SHAKEN_DPS if flight.kind in _WINGED else _SHAKEN_DPS
+    return np.asarray(smooth(table.t, np.degrees(rates), 8.0) > limit)
 
 
 def _vibration(flight: Flight, t: Floats) -> Floats:
@@ -181,9 +210,9 @@ def _accelerometers(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     if not all(axis in table.columns for table in sensors[:2] for axis in ACCELEROMETERS):
         return
     t = sensors[0].t
-    steady = [smooth(t, sensors[0][a] - aligned(t, sensors[1].t, sensors[1][a]), 10.0) for a in ACCELEROMETERS]
-    apart = length(steady)
-    limit = OFFSET_ACC + _ACC_PER_VIBE * _vibration(flight, t)
+    differences = [sensors[0][a] - aligned(t, sensors[1].t, sensors[1][a]) for a in ACCELEROMETERS]
+    apart = length(smooth(t, one, 10.0) for one in differences)
+    limit = OFFSET_ACC + _ACC_PER_VIBE * _vibration(flight, t) + _of_a_mean(flight, t, differences, 10.0)
     spans = lasting(t, apart > limit, _LASTS_S)
     if spans:
         inside = (t >= spans[0][0]) & (t <= spans[-1][1])

@@ -80,6 +80,8 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
     calm = flight.watch(table.t)
     for start, end in flight.watched:  # touching and leaving the ground shakes
         calm &= ~((table.t >= start) & (table.t < start + _SPIN_UP_S)) | (end - start < 3 * _SPIN_UP_S)
+    if flight.kind in ("plane", "quadplane"):  # wheels on grass, a catapult, a belly landing
+        calm &= during(((start + _SPIN_UP_S, end - _SPIN_UP_S) for start, end in flight.flown), table.t)
     t = table.t[calm]
     if len(t) < 3:
         return None

@@ -55,9 +55,10 @@ _METRES_PER_DEGREE = 111_319.49
 _HOMEWARD = (RETURN, LAND)
 _AT_HEIGHT_M = 0.5
 _STARTED = re.compile(r"Mission: (\d+) ")
-_REACHED = re.compile(r"Reached (?:command|waypoint) #(\d+)")
+_REACHED = re.compile(r"(?:Reached (?:command|waypoint)|Passed waypoint) #(\d+)")
 """A copter says it when the wait is over (ArduCopter/mode_auto.cpp), rovers and planes when they arrive
-(Rover/mode_auto.cpp)."""
+(Rover/mode_auto.cpp); a plane that flew past a waypoint's radius and over its finish line has passed it, and goes on
+(ArduPlane/commands_logic.cpp: verify_nav_wp)."""
 _COMPLETE = ("Mission Complete", "Mission complete")
 """What a rover (Rover/mode_auto.cpp) and a submarine say when no item is left."""
 SAID_AFTER_S = 0.6

@@ -1,0 +1,115 @@
+"""The airspeed sensor: it says the same all the time, the firmware gave it up; and a plane that flew too slow.
+
+A pitot tube that is blocked repeats itself, or follows the height; wind and turns move a sound reading all the time: of
+300 simulated flights none of a sound sensor stands still for five seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import lasting, smooth
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Table, Wanted
+
+READS: Wanted = {
+    "ARSP": ("Airspeed", "U", "H"),
+    "CTUN": ("As",),
+    "GPS": ("Spd",),
+    "ATT": ("Pitch",),
+}
+
+LIMITS = Limits()
+_STILL_MS = LIMITS.add("change of a sound airspeed", 0.005, "m/s", "no sound sensor of 300 simulated flights")
+_STILL_S = LIMITS.add("shortest time without a change", 5.0, "s", "a choice")
+_FLIES_MS = LIMITS.add(
+    "speed over ground of flight", 8.0, "m/s", "a choice: with the wind it is faster, against slower"
+)
+_GIVEN_UP_S = LIMITS.add("shortest time for which the firmware gave it up", 3.0, "s", "a choice")
+_SLOW = LIMITS.add("airspeed, as a share of AIRSPEED_MIN, below which a plane stalls", 0.85, "", "a choice")
+_SLOW_S = LIMITS.add("shortest time so slow", 2.0, "s", "a choice: a gust is over sooner")
+_SINKS_MS = LIMITS.add("sink of a stall", 3.0, "m/s", "a choice: TECS_SINK_MIN is 2 as shipped")
+_FAILED = LIMITS.add("probability of a sensor that stands still or was given up", 0.9, "", "6 of 6 simulated ones")
+_LOST = LIMITS.add("probability that it costs the mission", 0.4, "", "the firmware flies on without it")
+_STALLS = LIMITS.add("probability of a part, in a stall", 0.3, "", "a choice: speeds and gains make it stall as well")
+_HIGH_M = 15.0
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The sensor first: a plane that believes a false airspeed flies too slow by it."""
+    if flight.kind not in ("plane", "quadplane"):
+        return
+    moved = flight.one("GPS", "Spd")
+    sensor = flight.one("ARSP", "Airspeed")
+    if sensor is not None and moved is not None and flight.setting("ARSPD_USE") != 0:
+        yield from _failed(flight, sensor, moved)
+    if flight.kind == "plane":
+        yield from _stall(flight)
+
+
+def _failed(flight: Flight, sensor: Table, moved: Table) -> Iterator[Finding]:
+    t, read = sensor.t, sensor["Airspeed"]
+    flies = (np.interp(t, moved.t, moved["Spd"]) > _FLIES_MS) & during(flight.flown, t)
+    if flies.sum() < 10 or not (read[flies] > 0).any():
+        return
+    changes = np.abs(np.diff(read, prepend=read[:1] - 1.0))
+    still = lasting(t, flies & (changes < _STILL_MS), _STILL_S)
+    out = np.zeros(len(t), dtype=bool)
+    for column in ("U", "H"):
+        if column in sensor.columns and (sensor[column] > 0).any():
+            out |= sensor[column] == 0
+    given_up = lasting(t, flies & out, _GIVEN_UP_S)
+    if not still and not given_up:
+        return
+    spans = still or given_up
+    at = float(np.interp((spans[0][0] + spans[0][1]) / 2, t, read))
+    ground = float(np.mean(np.interp(t, moved.t, moved["Spd"])[during(spans, t)]))
+    said = [f"it reads {at:.1f} m/s without a change for {still[0][1] - still[0][0]:.0f} s" if still else "",
+            f"the firmware took it out of use at {given_up[0][0]:.0f} s" if given_up else "",
+            f"speed over ground {ground:.0f} m/s"]  # fmt: skip
+    yield Finding(
+        kind="airspeed",
+        title="the airspeed sensor failed",
+        onset_s=min(span[0] for span in (*still, *given_up)),
+        end_s=max(span[1] for span in (*still, *given_up)),
+        severity="warning",
+        evidence="; ".join(filter(None, said)),
+        source="ARSP.Airspeed, U, H against GPS.Spd",
+        probability=_FAILED,
+        mission_lost=_LOST,
+    )
+
+
+def _stall(flight: Flight) -> Iterator[Finding]:
+    flown, height, least = flight.one("CTUN", "As"), flight.height, flight.setting("AIRSPEED_MIN", "ARSPD_FBW_MIN")
+    if flown is None or height is None or not least:
+        return
+    t = flown.t
+    level = np.interp(t, *height)
+    sinks = -np.gradient(smooth(t, level, 1.0), t) if len(t) > 2 else np.zeros(len(t))
+    high = (level > _HIGH_M) & during(flight.flown, t)
+    spans = lasting(t, high & (flown["As"] < _SLOW * least) & (sinks > _SINKS_MS), _SLOW_S)
+    if not spans:
+        return
+    held = during(spans, t)
+    yield Finding(
+        kind="attitude",
+        title="the plane stalled",
+        onset_s=spans[0][0],
+        end_s=spans[-1][1],
+        severity="critical" if flight.impact_s is not None else "warning",
+        evidence=(
+            f"airspeed down to {float(np.min(flown['As'][held])):.1f} m/s (AIRSPEED_MIN {least:g}), "
+            f"sinking at {float(np.max(sinks[held])):.1f} m/s"
+        ),
+        source="CTUN.As, the height",
+        probability=_STALLS,
+    )
+
+
+CHECK = Check("airspeed", "an airspeed sensor that failed, a stall", READS, LIMITS, find)

@@ -1,0 +1,74 @@
+"""A plane's motor that draws less for its throttle than before: the motor, its controller or the propeller failed.
+
+The current of a propeller goes with the square of its throttle, near enough: over 300 simulated flights with a sound
+motor it stays within 0.93 and 1.08 times what it was, at any throttle above 30 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import lasting, steady
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+from care_core.numbers import median
+
+READS: Wanted = {
+    "BAT": ("Curr",),
+    "CTUN": ("ThO",),
+    "GPS": ("Spd",),
+}
+
+LIMITS = Limits()
+_PULLS = LIMITS.add("throttle at which the current tells", 0.3, "", "a choice: less hardly draws any")
+_DROP = LIMITS.add("current for its throttle, as a share of before", 0.65, "", "simulated sound motors: 0.93 to 1.08")
+_LASTS_S = LIMITS.add("shortest time of a lesser current", 5.0, "s", "a choice: a dive is over sooner")
+_ENOUGH_A = LIMITS.add("current that tells", 1.0, "A", "a choice: sensors have an offset")
+_FAILED = LIMITS.add("probability of the motor", 0.9, "", "none of 300 sound flights")
+_UNDER_WAY = LIMITS.add(
+    "speed, as a share of the usual, at which it tells", 0.6, "", "a choice: standing, it pulls more"
+)
+_BEFORE = 10
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """A drop of the current that one throttle takes."""
+    battery, driven, moved = flight.one("BAT", "Curr"), flight.one("CTUN", "ThO"), flight.one("GPS", "Spd")
+    if flight.kind != "plane" or battery is None or driven is None or moved is None:
+        return
+    throttle = np.interp(battery.t, driven.t, driven["ThO"])
+    speed = np.interp(battery.t, moved.t, moved["Spd"])
+    pulls = (throttle > _PULLS) & during(flight.flown, battery.t)
+    pulls &= speed > _UNDER_WAY * float(median(speed[pulls])) if pulls.any() else False
+    t, current, throttle = battery.t[pulls], battery["Curr"][pulls], throttle[pulls]
+    if len(t) < 2 * _BEFORE or float(median(current)) < _ENOUGH_A:
+        return
+    taken = steady(t, current / throttle**2, 4.0)
+    usual = np.maximum.accumulate(steady(t, taken, 8.0))
+    spans = lasting(t, taken < _DROP * usual, _LASTS_S, gap_s=3.0)
+    if not spans:
+        return
+    held = during(spans, t)
+    now, before = float(np.mean(current[held])), float(np.mean(usual[held] * throttle[held] ** 2))
+    yield Finding(
+        kind="motor",
+        title="the motor lost thrust",
+        onset_s=spans[0][0],
+        end_s=spans[-1][1],
+        severity="critical",
+        evidence=(
+            f"{now:.1f} A at {100 * float(np.mean(throttle[held])):.0f} % throttle, where it drew {before:.1f} A before "
+            f"(limit {_DROP:g} of it)"
+        ),
+        source="BAT.Curr, CTUN.ThO",
+        probability=_FAILED,
+        mission_lost=0.7,
+    )
+
+
+CHECK = Check("propeller", "a plane's motor that draws less for its throttle than before", READS, LIMITS, find)

@@ -1,0 +1,332 @@
+"""What only ArduPilot's planes and QuadPlanes log: height, airspeed and way along the legs, surfaces, throttle, wind.
+
+What a leg is measured over: from the start of a waypoint's item to its arrival. The first leg is left out, since a
+plane climbs out along its runway before it turns to its mission, and so is the landing: what comes after the item that
+begins it, and the straight final. Loiters are items of their own, and no legs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.ardupilot.held_missions import LAND, LAND_START, LOITER_TURNS, RETURN
+from care_core.ecosystems.ardupilot.instances import split
+from care_core.ecosystems.ardupilot.measures import rests
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse, distance_to_legs
+from care_core.ecosystems.ardupilot.measures.phases import flown_mission
+from care_core.ecosystems.ardupilot.measures.requested import ITEMS, mission_held
+from care_core.ecosystems.ardupilot.measures.samples import samples
+from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, statistic
+from care_core.ecosystems.coverage import EXTREME, USUAL, Samples, Span
+from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, missing, numeric, one_of
+from care_core.logs.base import Table, Wanted, merge_needs
+from care_core.numbers import median
+from care_core.records import Record
+from care_core.run import Unavailable, Value
+
+Floats = NDArray[np.float64]
+
+_STAT = one_of("mean, max, min, rms or peak (95th percentile)", "mean", "max", "min", "rms", "peak")
+_FULL_DEFLECTION, _AT_LIMIT = 4500.0, 0.95
+"""AETR of a surface that is out to its stop (SRV_Channel: -4500 to 4500)."""
+_LANDING = (RETURN, LAND, LAND_START)
+_STRAIGHT_DEG = 15.0
+"""Legs on the final lead on within so much."""
+_STEADY_DEG, _STEADY_MS = 15.0, 1.0
+"""A plane flies level and straight within so much bank and so much climb."""
+_TOUCHDOWN_S = 4.0
+"""The last seconds of a glide before the ground."""
+_GROUND_M, _CLIMBED_M = 3.0, 5.0
+_MIN_AIRSPEED = 5.0
+
+_AIRSPEED: Wanted = {"CTUN": ("As",), "NTUN": ("TAsp",)}
+_HEIGHT: Wanted = {"NTUN": ("AltE",)}
+_SURFACES: Wanted = {"AETR": ("Ail", "Elev", "Thr")}
+_CLIMB: Wanted = {"TECS": ("dh", "dhdem")}
+_WIND: Wanted = {"XKF2": ("C", "VWN", "VWE")}
+
+
+class Legs(Record, eq=False):
+    """The legs of a plane's mission that are judged."""
+
+    route: Floats
+    """Shape (waypoints, 2): north and east of home in metres, the first where the first leg begins that is judged."""
+    spans: dict[int, Span]
+    """When each was flown whole, by its place in `route`, from 1."""
+
+
+def legs_of(mission: Mission) -> Legs | Unavailable:
+    """The legs between the waypoints before the landing; use through `mission.shared`."""
+    flown, held = mission.shared(analyse), mission.shared(mission_held)
+    if isinstance(held, Unavailable) or not len(flown.route):
+        return held if isinstance(held, Unavailable) else missing("CMD")
+    before = min((number for number, item in held.items.items() if item.command in _LANDING), default=math.inf)
+    route = flown.route[: sum(number < before for number in held.waypoints)]
+    if flown.end is not None and held.items[max(held.items)].command == LAND:
+        route = route[: len(route) - _on_final(np.vstack((route, flown.end)))]
+    spans = {
+        number - 1: (phase.start_s, phase.end_s)
+        for (name, number), phase in flown.phases.items()
+        if name == "leg" and 1 < number <= len(route)
+    }
+    return Legs(route, spans)
+
+
+def _on_final(way: Floats) -> int:
+    """How many of the waypoints before the last point of a way lie on the straight that leads to it; two at least make
+    a final, one is any waypoint."""
+    course = _courses(way)
+    count = 0
+    while count + 1 < len(course) and abs(_turn(course[-1] - course[-2 - count])) < _STRAIGHT_DEG:
+        count += 1
+    return count + 1 if count else 0
+
+
+def _courses(way: Floats) -> Floats:
+    """Course of each leg of a way, in degrees."""
+    step = np.diff(way, axis=0)
+    return np.asarray(np.degrees(np.arctan2(step[:, 1], step[:, 0])))
+
+
+def _turn(degrees: Floats) -> Floats:
+    return np.asarray((degrees + 180.0) % 360.0 - 180.0)
+
+
+def legs_flown(mission: Mission) -> list[Span] | Unavailable:
+    """When each leg was flown whole."""
+    legs = mission.shared(legs_of)
+    if isinstance(legs, Unavailable):
+        return legs
+    return list(legs.spans.values()) or Unavailable("the flight completed no leg after the first")
+
+
+def on_legs(mission: Mission, channel: str, *fields: str) -> Table | Unavailable:
+    """Rows of the first instance of a channel on those legs, with all of `fields` finite."""
+    spans = legs_flown(mission)
+    if isinstance(spans, Unavailable):
+        return spans
+    table = mission.table(channel)
+    if table is None or not all(field in table.columns for field in fields):
+        return missing(channel)
+    table = next(iter(split(channel, table)), table)
+    wanted = np.logical_and.reduce([np.isfinite(table[field]) for field in fields])
+    wanted &= np.logical_or.reduce([(table.t >= start) & (table.t <= end) for start, end in spans])
+    rows = table.where(wanted)
+    return rows if len(rows) >= MIN_ROWS else Unavailable(f"too little {channel} on the legs")
+
+
+def _rests_on(channels: Sequence[str]) -> RestsOn:
+    def rests_on(mission: Mission, args: Args) -> Iterator[Samples]:
+        spans = legs_flown(mission)
+        for channel in channels:
+            bears = EXTREME if args.get("stat") in ("max", "min") else USUAL
+            yield samples(mission, channel, (), () if isinstance(spans, Unavailable) else spans, bears)
+
+    return rests_on
+
+
+def _of_legs(
+    name: str, wanted: Wanted, unit: str, doc: str, measure: Callable[[Table, Mission, Args], Floats], *, stat: str,
+    args: Mapping[str, str] | None = None,
+) -> None:  # fmt: skip
+    """Register an extractor that is a statistic of one channel on the legs."""
+    ((channel, fields),) = wanted.items()
+    required = [field for field in fields if field != "C"]
+
+    def compute(mission: Mission, given: Args) -> Value:
+        table = on_legs(mission, channel, *required)
+        if isinstance(table, Unavailable):
+            return table
+        return statistic(measure(table, mission, given), str(given.get("stat", stat)))
+
+    compute.__module__ = __name__
+    compute.__doc__ = f"{doc} On the legs; statistic: {stat} unless `stat` says otherwise."
+    described = {"stat": _STAT, **(args or {})}
+    extractor(name, needs=merge_needs((NEEDS, wanted)), unit=unit, args=described, rests_on=_rests_on([channel]))(
+        compute
+    )
+
+
+def _surface(table: Table, args: Args) -> Floats:
+    column = {"roll": "Ail", "pitch": "Elev"}[str(args.get("axis", "roll"))]
+    return np.asarray(table[column] / _FULL_DEFLECTION)
+
+
+_AXIS = {"axis": one_of("roll (ailerons) or pitch (elevator); roll unless given", "roll", "pitch")}
+
+_of_legs("height_error", _HEIGHT, "m", "Wanted minus flown height of a plane.",
+         lambda t, _m, _a: np.abs(t["AltE"]), stat="mean")  # fmt: skip
+_of_legs("airspeed", {"CTUN": ("As",)}, "m/s", "Airspeed of a plane.", lambda t, _m, _a: t["As"], stat="mean")
+_of_legs("crosstrack_error", {"NTUN": ("XT",)}, "m", "Distance of a plane from the line that it steers along.",
+         lambda t, _m, _a: np.abs(t["XT"]), stat="rms")  # fmt: skip
+_of_legs("climb_error", _CLIMB, "m/s", "Wanted minus flown climb rate of a plane, by its energy controller.",
+         lambda t, _m, _a: t["dhdem"] - t["dh"], stat="rms")  # fmt: skip
+_of_legs("plane_throttle", {"CTUN": ("ThO",)}, "%", "Throttle of a plane.", lambda t, _m, _a: t["ThO"], stat="mean")
+_of_legs("plane_throttle_saturation", {"CTUN": ("ThO",)}, "",
+         "Share of the time in which a plane's throttle is at THR_MAX.",
+         lambda t, m, _a: (t["ThO"] >= _limit(m, "THR_MAX", 100.0) - 1.0).astype(float), stat="mean")  # fmt: skip
+_of_legs("surface_output", _SURFACES, "", "How far the ailerons or the elevator are out, as a share of their travel.",
+         lambda t, _m, a: _surface(t, a), stat="rms", args=_AXIS)  # fmt: skip
+_of_legs("surface_saturation", _SURFACES, "", "Share of the time in which ailerons or elevator are at their stop.",
+         lambda t, _m, a: (np.abs(_surface(t, a)) >= _AT_LIMIT).astype(float), stat="mean", args=_AXIS)  # fmt: skip
+_of_legs("bank_angle", {"ATT": ("Roll",)}, "deg", "Bank of a plane.", lambda t, _m, _a: np.abs(t["Roll"]), stat="peak")
+_of_legs("plane_pitch", {"ATT": ("Pitch",)}, "deg", "Pitch of a plane.", lambda t, _m, _a: t["Pitch"], stat="mean")
+_of_legs("wind_speed", _WIND, "m/s", "Wind as the estimator has it.",
+         lambda t, _m, _a: np.hypot(t["VWN"], t["VWE"]), stat="mean")  # fmt: skip
+
+
+def _limit(mission: Mission, name: str, default: float) -> float:
+    value = mission.settings.get(name, default)
+    return float(value) if isinstance(value, (int, float)) else default
+
+
+@extractor(
+    "airspeed_error",
+    needs=merge_needs((NEEDS, _AIRSPEED)),
+    unit="m/s",
+    args={"stat": _STAT},
+    rests_on=_rests_on(["CTUN", "NTUN"]),
+)
+def airspeed_error(mission: Mission, args: Args) -> Value:
+    """Wanted minus flown airspeed of a plane on the legs. Statistic: mean unless `stat` says otherwise."""
+    flown = on_legs(mission, "CTUN", "As")
+    wanted = on_legs(mission, "NTUN", "TAsp")
+    if isinstance(flown, Unavailable):
+        return flown
+    if isinstance(wanted, Unavailable):
+        return wanted
+    off = flown["As"] - np.interp(flown.t, wanted.t, wanted["TAsp"])
+    return statistic(np.abs(off), str(args.get("stat", "mean")))
+
+
+@extractor(
+    "leg_error",
+    needs=NEEDS,
+    unit="m",
+    args={"stat": one_of("max, mean or peak (95th percentile)", "max", "mean", "peak")},
+    rests_on=rests.position(EXTREME),
+)
+def leg_error(mission: Mission, args: Args) -> Value:
+    """Horizontal distance of a plane from the nearest of its legs while it flies one. Statistic: max unless `stat` says
+    otherwise."""
+    spans, legs, flown = legs_flown(mission), mission.shared(legs_of), flown_mission(mission)
+    if isinstance(spans, Unavailable):
+        return spans
+    if isinstance(legs, Unavailable) or isinstance(flown, Unavailable) or flown.track is None:
+        return missing("POS")
+    parts = [part.filled_in() for start, end in spans if (part := flown.track.between(start, end)) is not None]
+    if not parts:
+        return missing("POS")
+    points = np.concatenate([np.column_stack((part.north, part.east)) for part in parts])
+    return statistic(distance_to_legs(points, legs.route), str(args.get("stat", "max")))
+
+
+@extractor("leg_speed", needs=NEEDS, unit="m/s")
+def leg_speed(mission: Mission, args: Args) -> Value:
+    """Length of the completed legs of a plane but the first over the time for them: speed over ground."""
+    legs = mission.shared(legs_of)
+    if isinstance(legs, Unavailable):
+        return legs
+    lengths = np.hypot(*np.diff(legs.route, axis=0).T)
+    flown_s = sum(end - start for start, end in legs.spans.values())
+    if flown_s <= 0:
+        return Unavailable("the flight completed no leg after the first")
+    return sum(float(lengths[number - 1]) for number in legs.spans) / flown_s
+
+
+@extractor(
+    "surface_rate_error",
+    needs=merge_needs((NEEDS, {"PIDR": ("Tar", "Act"), "PIDP": ("Tar", "Act")})),
+    unit="deg/s",
+    args={"stat": _STAT, **_AXIS},
+    rests_on=_rests_on(["ATT"]),
+)
+def surface_rate_error(mission: Mission, args: Args) -> Value:
+    """Wanted minus flown rotation rate of a plane on the legs. Statistic: rms unless `stat` says otherwise."""
+    table = on_legs(mission, "PIDP" if args.get("axis") == "pitch" else "PIDR", "Tar", "Act")
+    if isinstance(table, Unavailable):
+        return table
+    return statistic(table["Tar"] - table["Act"], str(args.get("stat", "rms")))
+
+
+@extractor(
+    "level_power",
+    needs=merge_needs((NEEDS, {"ATT": ("Roll",), "CTUN": ("As",), "BAT": ("Inst", "Volt", "Curr"), "TECS": ("dh",)})),
+    unit="W",
+    args={
+        "airspeed": numeric("airspeed in m/s at which the power is given"),
+        "power": numeric("by which power of the airspeed it grows; 3 unless given"),
+    },
+    rests_on=_rests_on(["BAT", "CTUN"]),
+)
+def level_power(mission: Mission, args: Args) -> Value:
+    """Electric power of a plane in straight and level flight, as it would be at `airspeed`: median."""
+    leans = on_legs(mission, "ATT", "Roll")
+    flown = on_legs(mission, "CTUN", "As")
+    climbs = on_legs(mission, "TECS", "dh")
+    battery = on_legs(mission, "BAT", "Volt", "Curr")
+    for table in (leans, flown, climbs, battery):
+        if isinstance(table, Unavailable):
+            return table
+    assert not isinstance(leans, Unavailable) and not isinstance(flown, Unavailable)
+    assert not isinstance(climbs, Unavailable) and not isinstance(battery, Unavailable)
+    airspeed = np.interp(battery.t, flown.t, flown["As"])
+    steady = (np.abs(np.interp(battery.t, leans.t, leans["Roll"])) < _STEADY_DEG) & (airspeed > _MIN_AIRSPEED)
+    steady &= np.abs(np.interp(battery.t, climbs.t, climbs["dh"])) < _STEADY_MS
+    if steady.sum() < MIN_ROWS:
+        return Unavailable("it hardly flew straight and level")
+    power = battery["Volt"][steady] * battery["Curr"][steady]
+    factor = (float(args.get("airspeed", 20.0)) / airspeed[steady]) ** float(args.get("power", 3.0))
+    value = float(median(power * factor))
+    return value if value > 0 else Unavailable("the battery's current was never above 0", "calibrate the monitor")
+
+
+@extractor("touchdown_sink", needs=NEEDS, unit="m/s", rests_on=rests.landing)
+def touchdown_sink(mission: Mission, args: Args) -> Value:
+    """The fastest sink of a plane in its last metres."""
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    if flown.track is None:
+        return missing("POS")
+    t, height = flown.track.t, flown.track.height
+    high = np.flatnonzero(height > height[-1] + _GROUND_M)
+    if not len(high):
+        return Unavailable("it never left the ground")
+    last = (t >= t[high[-1]] - 0.5) & (t <= t[high[-1]] + _TOUCHDOWN_S)
+    if last.sum() < MIN_ROWS:
+        return Unavailable("too few positions at the landing", "record POS")
+    return float(np.max(-np.diff(height[last]) / np.diff(t[last])))
+
+
+@extractor("never_climbed", needs=NEEDS, unit="", rests_on=rests.position(EXTREME))
+def never_climbed(mission: Mission, args: Args) -> Value:
+    """1 when a plane was armed and never rose above 5 m, else 0."""
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    if flown.track is None:
+        return missing("POS")
+    return float(np.ptp(flown.track.height) < _CLIMBED_M)
+
+
+@extractor("loiter_turns", needs=ITEMS, unit="")
+def loiter_turns(mission: Mission, args: Args) -> Value:
+    """How many circles a mission asks a plane to fly."""
+    held = mission.shared(mission_held)
+    if isinstance(held, Unavailable):
+        return held
+    return float(sum(max(item.first, 0.0) for item in held.items.values() if item.command == LOITER_TURNS))
+
+
+@extractor("sharpest_corner", needs=NEEDS, unit="deg")
+def sharpest_corner(mission: Mission, args: Args) -> Value:
+    """The largest change of course between two legs of a plane's mission."""
+    legs = mission.shared(legs_of)
+    if isinstance(legs, Unavailable):
+        return legs
+    return float(np.max(np.abs(_turn(np.diff(_courses(legs.route)))), initial=0.0))
