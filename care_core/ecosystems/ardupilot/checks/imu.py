@@ -66,13 +66,9 @@ _LOST = LIMITS.add(
     "probability that noise costs the mission", 0.15, "",
     "4 of 10 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
 )  # fmt: skip
-_OF_CHANGE = LIMITS.add(
-    "difference of a plane's gyros, as a share of its rates' change", 0.06, "", "a choice: see above"
-)
+_OF_CHANGE = LIMITS.add("difference of a plane's gyros, as a share of its rates' change", 0.06, "", "a choice")
 _ERRORS = LIMITS.add("standard errors by which a plane's sensors differ by chance", 4.0, "", "a choice")
-_PLANE_SHAKEN_DPS = LIMITS.add(
-    "turning to and fro at which a plane's gyros are not compared", 12.0, "deg/s", "a choice"
-)
+_PLANE_SHAKEN_DPS = LIMITS.add("shaking of a plane that hides an offset", 12.0, "deg/s", "a choice")
 _WINGED = ("plane", "quadplane")
 _FAILED = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
 _APART = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
@@ -120,7 +116,7 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     offset = np.max([np.abs(smooth(t, axis, _OFFSET_OVER_S)) for axis in apart], axis=0)
     vibration = _vibration(flight, t)
     limit = NOISE_DPS + _DPS_PER_VIBE * vibration + _turning(sensors[0]) + _at_another_moment(flight, sensors[0])
-    chance = _of_a_mean(flight, t, apart, _OFFSET_OVER_S)
+    chance = _of_a_mean(flight, t, list(apart), _OFFSET_OVER_S)
     over = np.maximum(noise / limit, np.where(_shaken(flight, sensors[0]), 0.0, offset / (OFFSET_DPS + chance)))
     spans = lasting(t, over > 1.0, _LASTS_S, gap_s=3.0)
     if not spans:

@@ -265,15 +265,13 @@ def surface_rate_error(mission: Mission, args: Args) -> Value:
 )
 def level_power(mission: Mission, args: Args) -> Value:
     """Electric power of a plane in straight and level flight, as it would be at `airspeed`: median."""
-    leans = on_legs(mission, "ATT", "Roll")
-    flown = on_legs(mission, "CTUN", "As")
-    climbs = on_legs(mission, "TECS", "dh")
-    battery = on_legs(mission, "BAT", "Volt", "Curr")
-    for table in (leans, flown, climbs, battery):
+    tables = []
+    for channel, fields in (("ATT", ("Roll",)), ("CTUN", ("As",)), ("TECS", ("dh",)), ("BAT", ("Volt", "Curr"))):
+        table = on_legs(mission, channel, *fields)
         if isinstance(table, Unavailable):
             return table
-    assert not isinstance(leans, Unavailable) and not isinstance(flown, Unavailable)
-    assert not isinstance(climbs, Unavailable) and not isinstance(battery, Unavailable)
+        tables.append(table)
+    leans, flown, climbs, battery = tables
     airspeed = np.interp(battery.t, flown.t, flown["As"])
     steady = (np.abs(np.interp(battery.t, leans.t, leans["Roll"])) < _STEADY_DEG) & (airspeed > _MIN_AIRSPEED)
     steady &= np.abs(np.interp(battery.t, climbs.t, climbs["dh"])) < _STEADY_MS

@@ -27,9 +27,7 @@ READS: Wanted = {
 LIMITS = Limits()
 _STILL_MS = LIMITS.add("change of a sound airspeed", 0.005, "m/s", "no sound sensor of 300 simulated flights")
 _STILL_S = LIMITS.add("shortest time without a change", 5.0, "s", "a choice")
-_FLIES_MS = LIMITS.add(
-    "speed over ground of flight", 8.0, "m/s", "a choice: with the wind it is faster, against slower"
-)
+_FLIES_MS = LIMITS.add("speed over ground of flight", 8.0, "m/s", "a choice: no plane taxies so fast")
 _GIVEN_UP_S = LIMITS.add("shortest time for which the firmware gave it up", 3.0, "s", "a choice")
 _SLOW = LIMITS.add("airspeed, as a share of AIRSPEED_MIN, below which a plane stalls", 0.85, "", "a choice")
 _SLOW_S = LIMITS.add("shortest time so slow", 2.0, "s", "a choice: a gust is over sooner")

@@ -30,9 +30,7 @@ _DROP = LIMITS.add("current for its throttle, as a share of before", 0.65, "", "
 _LASTS_S = LIMITS.add("shortest time of a lesser current", 5.0, "s", "a choice: a dive is over sooner")
 _ENOUGH_A = LIMITS.add("current that tells", 1.0, "A", "a choice: sensors have an offset")
 _FAILED = LIMITS.add("probability of the motor", 0.9, "", "none of 300 sound flights")
-_UNDER_WAY = LIMITS.add(
-    "speed, as a share of the usual, at which it tells", 0.6, "", "a choice: standing, it pulls more"
-)
+_UNDER_WAY = LIMITS.add("speed, as a share of the usual, at which it tells", 0.6, "", "a choice: at rest it takes more")
 _BEFORE = 10
 
 
@@ -62,7 +60,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         end_s=spans[-1][1],
         severity="critical",
         evidence=(
-            f"{now:.1f} A at {100 * float(np.mean(throttle[held])):.0f} % throttle, where it drew {before:.1f} A before "
+            f"{now:.1f} A at {100 * float(np.mean(throttle[held])):.0f} % throttle, which drew {before:.1f} A "
+            "before "
             f"(limit {_DROP:g} of it)"
         ),
         source="BAT.Curr, CTUN.ThO",
