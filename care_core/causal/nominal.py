@@ -375,6 +375,22 @@ _POWER_AT_MS = 22.0
 """Airspeed for which `level_power` is given."""
 
 
+# --- submarines: legs at a speed, up and down at others ---------------------------------------------------------
+
+_DIVE = ("path_length", "legs", "climb", "descent", "hold_time", "speed", "climb_speed", "descent_speed")
+_LEG_S = 3.0
+"""What speeding up and slowing down add to each leg."""
+
+
+@formula(*_DIVE)
+def dive_mission_time(given: Given) -> FloatArray:
+    """The legs of a submarine, each as long as its way or its change of depth takes, and the waits at their ends."""
+    over = given["path_length"] / np.maximum(given["speed"], _TINY)
+    up = given["climb"] / np.maximum(given["climb_speed"], _TINY)
+    down = given["descent"] / np.maximum(given["descent_speed"], _TINY)
+    return np.asarray(given["hold_time"] + given["legs"] * _LEG_S + np.maximum(over, up + down))
+
+
 # --- robots on goals: driven from one to the next, turned at each --------------------------------------------------
 
 # What the goals of training took at the reference configuration of move_base (0.5 m/s, 1 rad/s): the way at full speed,

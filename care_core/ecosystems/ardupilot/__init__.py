@@ -27,6 +27,7 @@ class ArduPilot(Ecosystem):
     measures = (
         "care_core.ecosystems.ardupilot.measures.energy",
         "care_core.ecosystems.ardupilot.measures.events",
+        "care_core.ecosystems.ardupilot.measures.hover",
         "care_core.ecosystems.ardupilot.measures.mission",
         "care_core.ecosystems.ardupilot.measures.outcome",
         "care_core.ecosystems.ardupilot.measures.requested",

@@ -21,6 +21,8 @@ WAYPOINT, LOITER_TURNS, LOITER_TIME, RETURN, LAND, TAKEOFF, SPLINE = 16, 18, 19,
 DELAY, JUMP, CHANGE_SPEED, LAND_START = 93, 177, 178, 189
 PLACES = frozenset((WAYPOINT, LOITER_TURNS, LOITER_TIME, SPLINE))
 HOLDS = frozenset((WAYPOINT, LOITER_TIME))
+_OF_QUADPLANES = {84: TAKEOFF, 85: LAND}
+"""MAV_CMD_NAV_VTOL_TAKEOFF and _LAND: upright, but a take-off and a landing."""
 
 _UPLOAD_S = 5.0
 """Changes that follow each other within this are one upload."""
@@ -125,5 +127,13 @@ def _records(table: Table) -> Iterator[tuple[float, int, Item, int | None]]:
     for t, count, row in zip(table.t.tolist(), counts, zip(*columns, strict=True), strict=True):
         number, command, first, second, lat, lng, alt, frame = row
         if math.isfinite(number) and math.isfinite(command):
-            item = Item(int(command), first, second, lat, lng, alt, int(frame) if math.isfinite(frame) else 0)
+            item = Item(
+                _OF_QUADPLANES.get(int(command), int(command)),
+                first,
+                second,
+                lat,
+                lng,
+                alt,
+                int(frame) if math.isfinite(frame) else 0,
+            )
             yield t, int(number), item, int(count) if math.isfinite(count) else None

@@ -53,6 +53,7 @@ AIRBORNE_M = 2.0
 
 _METRES_PER_DEGREE = 111_319.49
 _HOMEWARD = (RETURN, LAND)
+_WITHOUT_AIR = ("rover", "sub")
 _AT_HEIGHT_M = 0.5
 _STARTED = re.compile(r"Mission: (\d+) ")
 _REACHED = re.compile(r"(?:Reached (?:command|waypoint)|Passed waypoint) #(\d+)")
@@ -135,8 +136,8 @@ class FlownMission(Record, eq=False):
     """None when the log holds no position."""
     phases: Mapping[tuple[str, int], Phase]
     drive: Phase | None = None
-    """Of a vehicle that stays on the ground: from the start of its mission to where it was complete, or broken off.
-    None of one that flies."""
+    """Of a vehicle that stays on the ground or in the water: from the start of its mission to where it was complete,
+    or broken off. None of one that flies."""
     completed: bool = False
     """Whether the vehicle said that its mission is complete, as rovers and submarines do."""
 
@@ -171,7 +172,10 @@ def analyse(mission: Mission) -> FlownMission:
     started, reached = _milestones(mission)
     texts = flight_of(mission).messages_between(mission.start_s, mission.end_s + SAID_AFTER_S)
     complete_s = next((t for t, text in reversed(texts) if text.startswith(_COMPLETE)), None)
-    drive = _drive(mission, complete_s) if flight_of(mission).kind == "rover" else None
+    kind = flight_of(mission).kind
+    if kind == "sub" and complete_s is None and numbers:
+        complete_s = reached.get(numbers[-1])  # it says no more when no item is left, and holds its depth
+    drive = _drive(mission, complete_s) if kind in _WITHOUT_AIR else None
     if drive is not None and numbers:
         started.setdefault(numbers[0], drive.start_s)  # named once, before the vehicle may move
     route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.events import CUT, UNRECORDED, crash_of, failed, forced, is_over
+from care_core.ecosystems.ardupilot.measures.events import CUT, NOT_FLOWN, UNRECORDED, crash_of, failed, forced, is_over
 from care_core.ecosystems.ardupilot.measures.flown_mission import (
     AIRBORNE_M,
     NEEDS,
@@ -41,6 +42,11 @@ _TOUCHED_S, _SWITCHED_OFF_S = 5.0, 0.05
 """Before the disarming, where the land detector found the ground: at most, and at least (disarming sets it as well)."""
 HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
 """Where heights are told: above home, else above some other ground."""
+
+
+_REFUSED_MISSION = re.compile(r"Mode change (?:to AUTO )?failed: .*(?:AUTO|requires position)", re.IGNORECASE)
+"""What a vehicle says that was told to begin its mission and would not (AP_Vehicle: notify_no_such_mode and the modes'
+own)."""
 
 
 _UNTOLD = Unavailable("the log does not say whether each waypoint was reached", "record MSG and POS from start to end")
@@ -191,10 +197,24 @@ def mission_success(mission: Mission, args: Args) -> Value:
     if not is_armed(mission):
         return 0.0
     if not flew_automatically(mission):
-        return Unavailable("no mission was flown")
+        return 0.0 if mission_refused(mission) else Unavailable("no mission was flown")
     if failed(mission):
         return 0.0
     return _mission_flown(mission) if is_over(mission) else CUT
+
+
+def mission_refused(mission: Mission) -> bool:
+    """Whether the vehicle would not begin its mission to the end, though it was armed and told to."""
+    told = flight_of(mission).messages_between(mission.start_s, mission.end_s)
+    return any(_REFUSED_MISSION.match(text) for _, text in told)
+
+
+@extractor("no_mission", needs=NEEDS, unit="")
+def no_mission(mission: Mission, args: Args) -> Value:
+    """1 when the vehicle was armed, told to begin its mission, and never did, else 0."""
+    if not is_armed(mission):
+        return NOT_FLOWN
+    return float(not flew_automatically(mission) and mission_refused(mission))
 
 
 def _mission_flown(mission: Mission) -> Value:

@@ -222,7 +222,8 @@ def leg_error(mission: Mission, args: Args) -> Value:
     if not parts:
         return missing("POS")
     points = np.concatenate([np.column_stack((part.north, part.east)) for part in parts])
-    return statistic(distance_to_legs(points, legs.route), str(args.get("stat", "max")))
+    way = np.vstack((np.zeros(2), legs.route))  # corners are cut: a leg begins before the one to it ends
+    return statistic(distance_to_legs(points, way), str(args.get("stat", "max")))
 
 
 @extractor("leg_speed", needs=NEEDS, unit="m/s")
