@@ -29,6 +29,8 @@ _SHOWN_BY: Mapping[FindingKind, str] = {
     "estimator": "estimator",
     "barometer": "barometer",
     "battery": "battery",
+    "airspeed": "airspeed",
+    "surface": "roll pitch",
     "attitude": "roll pitch",
     "tuning": "roll pitch",
     "takeoff": "height",

@@ -35,16 +35,23 @@ def was_refused(findings: Iterable[Finding]) -> bool:
 
 def trial(run: Run) -> str:
     """Where what was upset is tried before it runs its mission again."""
-    is_robot = format_named(run.log.format).ecosystem == "ros"
-    if is_robot or not flies(vehicle_of(run.log.facts, {}).kind):
-        return "in the simulator or at walking pace"
-    return "in the simulator or a low hover"
+    is_robot, kind = format_named(run.log.format).ecosystem == "ros", vehicle_of(run.log.facts, {}).kind
+    if kind == "plane":
+        return "in the simulator or on a short flight close by"
+    if kind == "sub":
+        return "in the simulator or in shallow water"
+    return f"in the simulator or {'a low hover' if not is_robot and flies(kind) else 'at walking pace'}"
 
 
 def bench(run: Run) -> str:
     """What to do where it was upset and nothing says why."""
-    parts = "drive, wheels and wiring" if "walking" in trial(run) else "motors, propellers and wiring"
-    return f"check {parts} on the bench, then try it {trial(run)}, before another mission"
+    place = trial(run)
+    parts = "motors, propellers and wiring"
+    if "walking" in place:
+        parts = "drive, wheels and wiring"
+    elif "flight" in place:
+        parts = "surfaces and their directions, motor, propeller and wiring"
+    return f"check {parts} on the bench, then try it {place}, before another mission"
 
 
 def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:

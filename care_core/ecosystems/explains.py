@@ -30,6 +30,7 @@ EXPLAINS: Explains = {
     "gps": frozenset(("estimator", "attitude", "crash", "prearm")),  # position control leans after a false position
     "compass": frozenset(("estimator", "attitude", "crash", "prearm")),  # a false heading steers the wrong way
     "barometer": frozenset(("estimator", "thrust", "crash", "prearm")),  # a false height
+    "leak": frozenset(("battery", "imu", "compass", "barometer", "motor", "log", "prearm")),  # it shorts things
     "airspeed": frozenset(("estimator", "attitude", "thrust", "crash", "prearm")),  # it flies too slow, or too fast
     "surface": frozenset(("tuning", "vibration", "thrust", "attitude", "takeoff", "airspeed", "motor", *_TUMBLES)),
     "estimator": frozenset(("attitude", "crash", "prearm")),

@@ -21,6 +21,7 @@ FindingKind = Literal[
     "battery",
     "radio",
     "airspeed",
+    "leak",
     "surface",
     "attitude",
     "tuning",

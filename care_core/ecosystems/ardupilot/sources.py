@@ -63,7 +63,7 @@ SOURCES = (
          mission_lost=ASIDE),
     Live("BAT", ("Curr",), "the current sensor", "battery", _s("current sensor", 30.0), _ANY, is_optional=True,
          mission_lost=ASIDE),
-    Live("ARSP", ("Airspeed",), "the airspeed sensor", "barometer", _s("airspeed", 5.0), _ANY, is_optional=True,
+    Live("ARSP", ("Airspeed",), "the airspeed sensor", "airspeed", _s("airspeed", 5.0), _ANY, is_optional=True,
          mission_lost=ASIDE),
     Live("RCOU", tuple(f"C{n}" for n in range(1, 15)), "the record of the motor outputs", "motor", _s("outputs", 10.0),
          _ANY, is_optional=True, mission_lost=ASIDE),
@@ -73,7 +73,7 @@ _SAME_THROTTLE = 0.03
 _METRES = 111_319.5
 _ZEROS: Mapping[str, tuple[FindingKind, str, tuple[str, ...]]] = {
     "MAG": ("compass", "compass", ("MagX", "MagY", "MagZ")),
-    "ARSP": ("barometer", "airspeed sensor", ("Airspeed",)),
+    "ARSP": ("airspeed", "airspeed sensor", ("Airspeed",)),
     "RFND": ("barometer", "range finder", ("Dist",)),
 }
 """Sensors that read zero where they are not fitted."""
