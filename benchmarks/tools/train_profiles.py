@@ -59,6 +59,27 @@ SOURCES = {
         "hardware failed; DataFlash logs, read by `care ingest`.",
         hardware="data/rover/table.csv",
     ),
+    "arduplane": Source(
+        ("data/plane/table.tar.xz",),
+        "Missions of the ArduPlane V4.5.4 firmware in its software-in-the-loop simulator, recorded by this project "
+        "under random configurations and winds: those of 313 flights of 27 settings (mission, plane, site) in which no "
+        "hardware failed; DataFlash logs, read by `care ingest`.",
+        hardware="data/plane/table.csv",
+    ),
+    "quadplane": Source(
+        ("data/quadplane/table.tar.xz",),
+        "Missions of the ArduPlane V4.5.4 firmware with a QuadPlane in its software-in-the-loop simulator, recorded by "
+        "this project under random configurations and winds: those of 156 flights of 13 settings (mission, QuadPlane, "
+        "site) in which no hardware failed; DataFlash logs, read by `care ingest`.",
+        hardware="data/quadplane/table.csv",
+    ),
+    "ardusub": Source(
+        ("data/sub/table.tar.xz",),
+        "Missions of the ArduSub firmware (of the source of release 4.5.4) in its software-in-the-loop simulator, "
+        "recorded by this project under random configurations and currents: those of 168 dives of 14 settings (mission, frame, "
+        "site) in which no hardware failed; DataFlash logs, read by `care ingest`.",
+        hardware="data/sub/table.csv",
+    ),
     "move_base": Source(
         ("data/move_base/train.tar.xz",),
         "301 missions of the ROS noetic navigation stack (move_base, navfn, dwa_local_planner, costmap_2d) driving a "

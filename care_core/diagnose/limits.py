@@ -156,7 +156,12 @@ def beyond_training(run: Run, schema: Schema, model: Model) -> str:
         value, summary = run.context.get(variable.name), model.summaries.get(variable.name)
         if variable.about != "mission" or variable.unit != "m" or summary is None or not is_known(value):
             continue
-        if not summary.low / UNLIKE <= value <= summary.high * UNLIKE:
+        if not _times(summary.low, least=True) <= value <= _times(summary.high, least=False):
             seen = f"{figures(summary.low)} to {figures(summary.high)}"
             return f"{variable.doc or variable.name} {figures(value)} {variable.unit}".rstrip() + f", {seen} there"
     return ""
+
+
+def _times(end: float, *, least: bool) -> float:
+    """How far beyond an end of what training saw is still alike; depths lie below 0."""
+    return (min if least else max)(end / UNLIKE, end * UNLIKE)

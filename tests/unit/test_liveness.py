@@ -61,7 +61,6 @@ def frozen(findings: tuple[Finding, ...]) -> list[Finding]:
         ("POS", "the estimated position is frozen", "estimator"),
         ("BAT", "the battery's monitor is frozen", "battery"),
         ("RCOU", "the record of the motor outputs is frozen", "motor"),
-        ("ARSP", "the airspeed sensor is frozen", "barometer"),
     ],
 )
 def test_a_source_that_freezes_in_flight_is_named_with_its_onset(message: str, title: str, kind: str) -> None:

@@ -18,8 +18,9 @@ from care_core.run import Run, is_known
 
 OF_KIND: Mapping[FindingKind, Sign] = {
     "prearm": "refused", "takeoff": "tipped", "crash": "upset", "attitude": "upset", "motor": "upset",
-    "surface": "upset", "airspeed": "height", "thrust": "thrust", "tuning": "oscillates", "compass": "heading", "gps": "position", "barometer": "height",
-    "estimator": "estimator", "imu": "vibration", "vibration": "vibration", "cpu": "loop", "blocked": "stuck",
+    "thrust": "thrust", "tuning": "oscillates", "compass": "heading", "gps": "position", "barometer": "height",
+    "surface": "upset", "airspeed": "height", "estimator": "estimator", "imu": "vibration", "vibration": "vibration",
+    "cpu": "loop", "blocked": "stuck",
 }  # fmt: skip
 _OF_TITLE: tuple[tuple[re.Pattern[str], Sign], ...] = (
     (re.compile(r"oscillates"), "oscillates"),

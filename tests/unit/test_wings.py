@@ -1,0 +1,129 @@
+"""What fails on a plane, planted into a sound flight: surfaces, the airspeed sensor, the propeller, a stall."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from care_core.ecosystems.findings import Finding, every_finding
+from tests.planes import MadePlane
+
+RATES_HZ = (10.0, 2.5)
+
+
+def found(flown: MadePlane, kind: str) -> Finding | None:
+    return next((one for one in every_finding(flown.find()) if one.kind == kind), None)
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sound_plane_is_silent(rate_hz: float, seed: int) -> None:
+    assert MadePlane(rate_hz, seed).find() == ()
+
+
+@pytest.mark.parametrize(("channel", "column", "title"), [
+    ("PIDP", "Elev", "the elevator turns the plane the wrong way"),
+    ("PIDR", "Ail", "the ailerons turn the plane the wrong way"),
+])  # fmt: skip
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_a_surface_that_turns_it_the_wrong_way(rate_hz: float, channel: str, column: str, title: str) -> None:
+    flown = MadePlane(rate_hz)
+    attitude = {"PIDP": "Pitch", "PIDR": "Roll"}[channel]
+    now = flown.after(50.0, 53.0)
+    flown.table["AETR"][column][now] = 4500.0
+    flown.table[channel]["Tar"][now] = 60.0
+    flown.table[channel]["Act"][now] = -40.0
+    flown.table["ATT"][attitude][now] -= 40.0 * (flown.t[now] - 50.0)
+    finding = found(flown, "surface")
+    assert finding is not None
+    assert finding.title == title
+    assert finding.severity == "critical"
+    assert 49.0 < finding.onset_s < 52.0
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_a_gust_is_no_reversed_surface(rate_hz: float) -> None:
+    flown = MadePlane(rate_hz)
+    now = flown.after(50.0, 50.4)
+    flown.table["AETR"]["Ail"][now] = 2000.0
+    flown.table["PIDR"]["Act"][now] = -40.0
+    flown.table["PIDR"]["Tar"][now] = 20.0
+    assert found(flown, "surface") is None
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_a_surface_at_its_stop_that_does_not_help(rate_hz: float) -> None:
+    flown = MadePlane(rate_hz)
+    now = flown.after(50.0, 60.0)
+    flown.table["AETR"]["Elev"][now] = 4400.0
+    flown.table["PIDP"]["Tar"][now] = 12.0
+    flown.table["PIDP"]["Act"][now] = 0.0
+    finding = found(flown, "surface")
+    assert finding is not None
+    assert finding.title.startswith("the elevator is at the stop")
+    assert finding.probability < 0.5  # a gain may hold it there as well
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_a_motor_that_draws_less_for_its_throttle(rate_hz: float) -> None:
+    flown = MadePlane(rate_hz)
+    flown.table["BAT"]["Curr"][flown.after(60.0)] *= 0.4
+    finding = found(flown, "motor")
+    assert finding is not None
+    assert finding.title == "the motor lost thrust"
+    assert abs(finding.onset_s - 60.0) < 4.0
+
+
+def test_a_throttle_that_is_taken_back_is_no_lost_motor() -> None:
+    flown = MadePlane()
+    low = flown.after(60.0)
+    flown.table["CTUN"]["ThO"][low] *= 0.7
+    flown.table["BAT"]["Curr"][low] *= 0.7**2
+    assert found(flown, "motor") is None
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_an_airspeed_that_stands_still(rate_hz: float) -> None:
+    flown = MadePlane(rate_hz)
+    flown.table["ARSP"]["Airspeed"][flown.after(55.0)] = 31.0
+    finding = found(flown, "airspeed")
+    assert finding is not None
+    assert finding.title == "the airspeed sensor failed"
+    assert abs(finding.onset_s - 55.0) < 2.0
+    assert "31.0 m/s" in finding.evidence
+
+
+def test_a_sensor_that_the_firmware_gave_up() -> None:
+    flown = MadePlane()
+    flown.table["ARSP"]["U"][flown.after(70.0)] = 0.0
+    finding = found(flown, "airspeed")
+    assert finding is not None
+    assert "took it out of use at 70 s" in finding.evidence
+
+
+def test_a_sensor_that_is_not_used_fails_nobody() -> None:
+    flown = MadePlane()
+    flown.settings["ARSPD_USE"] = 0
+    flown.table["ARSP"]["U"][flown.after(70.0)] = 0.0
+    assert found(flown, "airspeed") is None
+
+
+def test_a_stall() -> None:
+    flown = MadePlane()
+    slow = flown.after(60.0, 66.0)
+    flown.table["CTUN"]["As"][slow] = 8.0
+    sunk = np.interp(flown.t, [60.0, 66.0, 72.0], [0.0, 36.0, 0.0])
+    flown.table["POS"]["RelHomeAlt"] -= sunk
+    finding = next((one for one in every_finding(flown.find()) if one.title == "the plane stalled"), None)
+    assert finding is not None
+    assert "AIRSPEED_MIN 12" in finding.evidence
+
+
+def test_a_record_that_lost_its_attitude_for_a_while_is_read() -> None:
+    """A plane of which an attitude stands still for a while was once read with arrays of two lengths."""
+    flown = MadePlane()
+    still = flown.after(40.0, 50.0)
+    for name in ("Roll", "Pitch", "Yaw"):
+        flown.table["ATT"][name][still] = flown.table["ATT"][name][still][0]
+    titles = [one.title for one in every_finding(flown.find())]
+    assert "the attitude is frozen" in titles
