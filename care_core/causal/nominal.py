@@ -373,6 +373,26 @@ def plane_energy(given: Given) -> FloatArray:
 
 _POWER_AT_MS = 22.0
 """Airspeed for which `level_power` is given."""
+# Fitted to 69 training flights of the reference configuration: height error on legs that are level, the part of a climb
+# that a leg lags behind, and how far a corner leads off, in lengths of the guidance (AP_L1_Control.cpp: L1).
+_LEVEL_ERROR_M, _LAGS, _CORNER, _DAMPING, _OFF_A_CIRCLE = 1.6, 0.25, 0.38, 0.75, 1.25
+
+
+@formula(*_PLANE, "rises", "legs_length", "climb_rate")
+def plane_height_error(given: Given) -> FloatArray:
+    """Mean height error on the legs: a leg that leads up is flown below it until the climb is done."""
+    flown_s = given["legs_length"] / np.maximum(plane_airspeed(given), 1.0)
+    behind = _LAGS * given["rises"] / np.maximum(given["climb_rate"], 0.1)
+    return np.asarray(_LEVEL_ERROR_M + behind / np.maximum(flown_s, 1.0))
+
+
+@formula(*_PLANE, "period", "loiter_radius", "leg_after_loiter")
+def plane_path_error(given: Given) -> FloatArray:
+    """Largest distance from the legs: corners lead off by a share of the length of the guidance, and a leg that follows
+    a circle begins as far off as the circle is wide."""
+    guidance = given["period"] * _DAMPING * plane_airspeed(given) / np.pi
+    circle = given["leg_after_loiter"] * _OFF_A_CIRCLE * np.abs(given["loiter_radius"])
+    return np.asarray(np.maximum(_CORNER * guidance, circle))
 
 
 # --- submarines: legs at a speed, up and down at others ---------------------------------------------------------

@@ -40,6 +40,7 @@ LIMITS = Limits()
 APART_M = LIMITS.add("two barometers apart", 3.0, "m", "three times what arming allows between barometer and estimator")
 DRIFT_M = LIMITS.add("drift from the GPS height", 10.0, "m", "a choice: GPS heights wander by some metres in minutes")
 NOISE_M = LIMITS.add("noise from record to record", 0.5, "m", "three times what a good barometer resolves")
+_APART_S = LIMITS.add("time between records, of a plane", 0.15, "s", "a choice: half of what thinned logs hold")
 _LASTS_S = LIMITS.add("shortest time over a limit", 5.0, "s", "a choice: landing gusts press on it for a second")
 _SEVERE = LIMITS.add("times the limit that cost the height", 2.0, "", "a choice: the vehicle holds its height by it")
 _LOW_M = LIMITS.add("range at which it is compared", 3.0, "m", "a choice: higher, terrain explains a difference")
@@ -69,7 +70,9 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     first = baros[0]
     t, height = first.t, first["Alt"]
-    tests: list[tuple[Floats, str]] = [(_noise(flight, t, height) / NOISE_M, "jumps by {:.1f} m from record to record")]
+    tests: list[tuple[Floats, str]] = [
+        (_noise(flight, t, height) / (NOISE_M + _moved_between(flight, t)), "jumps by {:.1f} m from record to record")
+    ]
     for other in baros[1:]:
         apart = height - aligned(t, other.t, other["Alt"])
         apart -= median(apart[: max(len(t) // 20, 3)])
@@ -166,6 +169,14 @@ def _noise(flight: Flight, t: Floats, height: Floats) -> Floats:
     known = flight.height
     moved = np.interp(t, *known) if known is not None else np.zeros(len(t))
     return np.minimum(smooth(t, roughness(height - moved), 10.0), smooth(t, roughness(height), 10.0))
+
+
+def _moved_between(flight: Flight, t: Floats) -> Floats:
+    """How far a plane climbs or sinks between the records of its barometer and of its estimate, shape of `t`."""
+    known = flight.height
+    if flight.kind not in ("plane", "quadplane") or known is None or len(t) < 3:
+        return np.zeros(len(t))
+    return _APART_S * np.abs(np.gradient(np.interp(t, *known), t))
 
 
 def _drift(flight: Flight, first: Table) -> Floats | None:

@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.held_missions import LAND, LAND_START, LOITER_TURNS, RETURN
+from care_core.ecosystems.ardupilot.held_missions import LAND, LAND_START, LOITER_TIME, LOITER_TURNS, RETURN
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse, distance_to_legs
 from care_core.ecosystems.ardupilot.measures.phases import flown_mission
-from care_core.ecosystems.ardupilot.measures.requested import ITEMS, mission_held
+from care_core.ecosystems.ardupilot.measures.requested import ITEMS, mission_held, requested_mission
 from care_core.ecosystems.ardupilot.measures.samples import samples
 from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, statistic
 from care_core.ecosystems.coverage import EXTREME, USUAL, Samples, Span
@@ -33,6 +33,7 @@ Floats = NDArray[np.float64]
 _STAT = one_of("mean, max, min, rms or peak (95th percentile)", "mean", "max", "min", "rms", "peak")
 _FULL_DEFLECTION, _AT_LIMIT = 4500.0, 0.95
 """AETR of a surface that is out to its stop (SRV_Channel: -4500 to 4500)."""
+_CIRCLES = (LOITER_TURNS, LOITER_TIME)
 _LANDING = (RETURN, LAND, LAND_START)
 _STRAIGHT_DEG = 15.0
 """Legs on the final lead on within so much."""
@@ -55,6 +56,10 @@ class Legs(Record, eq=False):
 
     route: Floats
     """Shape (waypoints, 2): north and east of home in metres, the first where the first leg begins that is judged."""
+    heights: Floats
+    """Shape (waypoints,): metres above home."""
+    after_loiter: bool
+    """Whether one of the legs begins on a circle, and so off its line."""
     spans: dict[int, Span]
     """When each was flown whole, by its place in `route`, from 1."""
 
@@ -68,12 +73,16 @@ def legs_of(mission: Mission) -> Legs | Unavailable:
     route = flown.route[: sum(number < before for number in held.waypoints)]
     if flown.end is not None and held.items[max(held.items)].command == LAND:
         route = route[: len(route) - _on_final(np.vstack((route, flown.end)))]
+    numbers = held.waypoints[: len(route)]
+    loiters = [number for number, item in held.items.items() if item.command in _CIRCLES]
+    circling = any(numbers[0] < number < numbers[-1] for number in loiters) if numbers else False
+    heights = np.array([waypoint.alt_m for waypoint in flown.waypoints[: len(route)]])
     spans = {
         number - 1: (phase.start_s, phase.end_s)
         for (name, number), phase in flown.phases.items()
         if name == "leg" and 1 < number <= len(route)
     }
-    return Legs(route, spans)
+    return Legs(route, heights, circling, spans)
 
 
 def _on_final(way: Floats) -> int:
@@ -239,16 +248,20 @@ def leg_speed(mission: Mission, args: Args) -> Value:
     return sum(float(lengths[number - 1]) for number in legs.spans) / flown_s
 
 
+def _controller(args: Args) -> str:
+    return "PIDP" if args.get("axis") == "pitch" else "PIDR"
+
+
 @extractor(
     "surface_rate_error",
     needs=merge_needs((NEEDS, {"PIDR": ("Tar", "Act"), "PIDP": ("Tar", "Act")})),
     unit="deg/s",
     args={"stat": _STAT, **_AXIS},
-    rests_on=_rests_on(["ATT"]),
+    rests_on=lambda mission, args: _rests_on([_controller(args)])(mission, args),
 )
 def surface_rate_error(mission: Mission, args: Args) -> Value:
     """Wanted minus flown rotation rate of a plane on the legs. Statistic: rms unless `stat` says otherwise."""
-    table = on_legs(mission, "PIDP" if args.get("axis") == "pitch" else "PIDR", "Tar", "Act")
+    table = on_legs(mission, _controller(args), "Tar", "Act")
     if isinstance(table, Unavailable):
         return table
     return statistic(table["Tar"] - table["Act"], str(args.get("stat", "rms")))
@@ -329,3 +342,30 @@ def sharpest_corner(mission: Mission, args: Args) -> Value:
     if isinstance(legs, Unavailable):
         return legs
     return float(np.max(np.abs(_turn(np.diff(_courses(legs.route)))), initial=0.0))
+
+
+_LEGS: Mapping[str, Callable[[Legs, float], float]] = {
+    "length": lambda legs, _start_m: float(np.hypot(*np.diff(legs.route, axis=0).T).sum()) if len(legs.route) else 0.0,
+    "after_loiter": lambda legs, _start_m: float(legs.after_loiter),
+    "rises": lambda legs, start_m: (
+        float(
+            (np.maximum(np.diff(legs.heights), 0.0) ** 2).sum()
+            + _FIRST_CLIMB * max(float(legs.heights[0]) - start_m, 0.0) ** 2
+        )
+        if len(legs.heights)
+        else 0.0
+    ),
+}
+_FIRST_CLIMB = 0.5
+"""The part of the climb to the first waypoint that is left when its leg is over."""
+
+
+@extractor("legs_asked", needs=NEEDS, unit="", args={"what": one_of(", ".join(_LEGS), *_LEGS)})
+def legs_asked(mission: Mission, args: Args) -> Value:
+    """One number of the legs of a plane's mission that are judged: their `length` in m, whether one begins
+    `after_loiter`, the squares of what they lead up, `rises` in m^2."""
+    legs, asked = mission.shared(legs_of), mission.shared(requested_mission)
+    if isinstance(legs, Unavailable):
+        return legs
+    start_m = 0.0 if isinstance(asked, Unavailable) else float(asked.points[0, 2])
+    return _LEGS[str(args.get("what", "length"))](legs, start_m)

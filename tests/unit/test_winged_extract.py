@@ -1,0 +1,182 @@
+"""What is read of a plane's flight: planted waypoints, a circle and a landing with a straight final."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from care_core.ecosystems.ardupilot.measures import hover, winged  # noqa: F401  they register their extractors
+from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
+from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
+from care_core.logs.base import Table
+from care_core.run import Unavailable, Value
+from tests.tables import read
+
+KIND = MISSION_KINDS["ardupilot_flight"]
+HOME = (47.0, 8.0)
+METRES = 111_319.49
+EAST = METRES * math.cos(math.radians(HOME[0]))
+# North, east and height of the waypoints: a square, then two on the straight that leads home.
+WAY = [(300.0, 0.0, 60.0), (300.0, 300.0, 60.0), (0.0, 300.0, 80.0), (-600.0, 0.0, 60.0), (-300.0, 0.0, 30.0)]
+REACHED_S = [25.0, 40.0, 55.0, 90.0, 105.0]
+AT = np.arange(0.0, 140.0, 0.4)
+
+
+def table(rows: list[tuple[Any, ...]], *fields: str) -> Table:
+    columns = list(zip(*rows, strict=True))
+    typed = (np.array(column, dtype=object if isinstance(column[0], str) else float) for column in columns[1:])
+    return Table(np.array(columns[0], dtype=float), dict(zip(fields, typed, strict=True)))
+
+
+def flown(**replaced: Table) -> dict[str, Table]:
+    """Armed at 5 s, off the ground at 10 s; 20 m/s on the legs, 10 m beside the second one; a circle between 55 and
+    58 s; down and disarmed at 130 s."""
+    north = np.interp(AT, [10, *REACHED_S[:3], 58, *REACHED_S[3:], 120], [0, 300, 300, 0, 0, -600, -300, 0])
+    east = np.interp(AT, [10, *REACHED_S[:3], 58, *REACHED_S[3:], 120], [0, 0, 300, 300, 300, 0, 0, 0])
+    north = north + np.interp(AT, [28, 30, 35, 37], [0, 10, 10, 0])
+    height = np.interp(AT, [10, 20, 105, 120], [0, 60, 30, 0])
+    ones = np.ones_like(AT)
+    items = [(22, 15.0, 0.0, 0.0, 40.0)]
+    for k, (n, e, up) in enumerate(WAY):
+        items.append((16, 0.0, HOME[0] + n / METRES, HOME[1] + e / EAST, up))
+        if k == 2:
+            items.append((18, 2.0, HOME[0] + n / METRES, HOME[1] + e / EAST, up))
+    items.append((21, 0.0, *HOME, 0.0))
+    numbers = [2, 3, 4, 6, 7]
+    texts = [(20.0, "Mission: 2 WP")]
+    for number, t in zip(numbers, REACHED_S, strict=True):
+        said = "Passed waypoint #%d dist 3m" if number == 3 else "Reached waypoint #%d dist 40m"
+        texts.append((t, said % number))
+        texts.append((t, f"Mission: {number + 1} " + {4: "LoitTurns", 7: "Land"}.get(number, "WP")))
+    texts.append((58.0, "Mission: 6 WP"))
+    tables = {
+        "ARM": table([(5.0, 1, 0), (130.0, 0, 0)], "ArmState", "Forced"),
+        "MODE": table([(0.0, 10)], "ModeNum"),
+        "MSG": table(sorted(texts), "Message"),
+        "CMD": table(
+            [(0.0, 0, 16, 0.0, 0.0, *HOME, 0.0), *((0.0, k, c, p, 0.0, la, lo, up) for k, (c, p, la, lo, up)
+             in enumerate(items, start=1))], "CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt",
+        ),
+        "ORGN": table([(0.0, 1, *HOME, 500.0)], "Type", "Lat", "Lng", "Alt"),
+        "POS": Table(AT, {"Lat": HOME[0] + north / METRES, "Lng": HOME[1] + east / EAST, "RelHomeAlt": height}),
+        "CTUN": Table(AT, {"As": 19.0 * ones, "ThO": np.where(AT < 20, 100.0, 45.0)}),
+        "NTUN": Table(AT, {"AltE": np.where((AT > 26) & (AT < 39), -4.0, 2.0), "XT": 3.0 * ones, "TAsp": 20.0 * ones}),
+        "AETR": Table(AT, {"Ail": 450.0 * ones, "Elev": np.where(AT < 47, 4500.0, 0.0), "Thr": 45.0 * ones}),
+        "ATT": Table(AT, {"Roll": np.sin(AT), "Pitch": np.cos(AT), "Yaw": 10 * AT}),
+        "TECS": Table(AT, {"dh": 0.2 * ones, "dhdem": 0.5 * ones}),
+        "BAT": Table(AT, {"Volt": 12.0 * ones, "Curr": 10.0 * ones}),
+        "XKF2": Table(AT, {"C": 0 * ones, "VWN": 3.0 * ones, "VWE": 4.0 * ones}),
+        "PIDR": Table(AT, {"Tar": 5.0 * ones, "Act": 3.0 * ones}),
+        "PIDP": Table(AT, {"Tar": ones, "Act": ones}),
+        "RATE": Table(AT[AT < 20], {"RDes": 1 + 0 * AT[AT < 20], "R": 0 * AT[AT < 20]}),
+    }  # fmt: skip
+    return {**tables, **replaced}
+
+
+def mission(facts: str = "ArduPlane V4.5.4", **replaced: Table) -> Mission:
+    (found,) = KIND.missions(*read(flown(**replaced), 140.0, facts={"firmware": facts}), {"tolerance_m": 150})
+    return found
+
+
+def value(kind: str, /, flight: Mission | None = None, **args: Any) -> Value:
+    return find_extractor(kind).compute(mission() if flight is None else flight, args)
+
+
+def test_the_straight_final_and_the_first_leg_are_not_judged() -> None:
+    legs = winged.legs_of(mission())
+    assert not isinstance(legs, Unavailable)
+    assert len(legs.route) == 3
+    assert legs.spans == {1: (25.0, 40.0), 2: (40.0, 55.0)}
+
+
+def test_a_waypoint_that_was_passed_counts() -> None:
+    assert mission().shared(analyse).reached == 5
+    assert value("mission_success") == 1.0
+
+
+@pytest.mark.parametrize(("kind", "args", "expected"), [
+    ("leg_error", {}, 10.15),
+    ("leg_speed", {}, 600.0 / 30.0),
+    ("airspeed", {}, 19.0),
+    ("airspeed_error", {}, 1.0),
+    ("crosstrack_error", {}, 3.0),
+    ("plane_throttle", {}, 45.0),
+    ("plane_throttle_saturation", {}, 0.0),
+    ("climb_error", {}, 0.3),
+    ("surface_output", {"axis": "roll"}, 0.1),
+    ("surface_rate_error", {"axis": "roll"}, 2.0),
+    ("surface_rate_error", {"axis": "pitch"}, 0.0),
+    ("wind_speed", {}, 5.0),
+    ("loiter_turns", {}, 2.0),
+    ("sharpest_corner", {}, 90.0),
+    ("never_climbed", {}, 0.0),
+    ("level_power", {"airspeed": 19.0}, 120.0),
+    ("level_power", {"airspeed": 38.0}, 960.0),
+    ("assisted", {}, 0.0),
+    ("hover_rate_error", {"axis": "roll"}, 1.0),
+])  # fmt: skip
+def test_measures(kind: str, args: dict[str, Any], expected: float) -> None:
+    assert value(kind, **args) == pytest.approx(expected, abs=0.02)
+
+
+def test_a_height_is_off_by_its_mean_size() -> None:
+    off = value("height_error")
+    assert isinstance(off, float)
+    assert 2.5 < off < 3.5
+
+
+def test_a_plane_that_stays_on_the_ground_never_climbed() -> None:
+    tables = flown()
+    tables["POS"].columns["RelHomeAlt"][:] = 0.3
+    assert value("never_climbed", mission(POS=tables["POS"])) == 1.0
+
+
+@pytest.mark.parametrize("kind", ["leg_error", "leg_speed", "height_error", "airspeed_error", "level_power"])
+def test_a_flight_that_completed_no_leg_says_so(kind: str) -> None:
+    answer = value(kind, mission(MSG=table([(20.0, "Mission: 2 WP")], "Message")))
+    assert isinstance(answer, Unavailable)
+    assert "no leg" in answer.reason
+
+
+def test_a_quadplane_takes_off_and_lands_upright() -> None:
+    tables = flown()
+    command = tables["CMD"].columns["CId"]
+    command[command == 22], command[command == 21] = 84, 85
+    flight = mission("ArduPlane V4.5.4", CMD=tables["CMD"])
+    assert flight.shared(analyse).end == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert value("mission_success", flight) == 1.0
+
+
+def test_a_transition_takes_as_long_as_it_says() -> None:
+    rows = [(t, str(text)) for t, text in zip(flown()["MSG"].t, flown()["MSG"]["Message"], strict=True)]
+    rows += [(11.0, "Transition started airspeed 0.9"), (20.5, "Transition done")]
+    assert value("transition_time", mission(MSG=table(sorted(rows), "Message"))) == pytest.approx(9.5)
+    assert isinstance(value("transition_time"), Unavailable)
+
+
+def test_a_submarine_has_driven_its_mission_when_the_last_item_is_reached() -> None:
+    rows = [
+        (20.0, "Mission: 1 WP"),
+        (60.0, "Reached command #1"),
+        (60.0, "Mission: 2 WP"),
+        (99.0, "Reached command #2"),
+    ]
+    cmd = table(
+        [(0.0, 0, 16, 0.0, 0.0, *HOME, 0.0), *((0.0, k, 16, 0.0, 0.0, HOME[0] + 20 * k / METRES, HOME[1], -2.0 * k)
+         for k in (1, 2))], "CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt",
+    )  # fmt: skip
+    dive = mission("ArduSub V4.5.0", MSG=table(rows, "Message"), CMD=cmd, MODE=table([(8.0, 3)], "ModeNum"))
+    done = dive.shared(analyse)
+    assert done.drive is not None
+    assert (done.drive.start_s, done.drive.end_s, done.completed) == (8.0, 99.0, True)
+    assert value("mission_success", dive) == 1.0
+
+
+def test_a_mission_that_a_vehicle_would_not_begin_failed() -> None:
+    rows = [(10.0, "Mode change failed: AUTO requires position"), (20.0, "Mode change failed: AUTO requires position")]
+    dive = mission("ArduSub V4.5.0", MSG=table(rows, "Message"), MODE=table([(0.0, 19)], "ModeNum"))
+    assert value("mission_success", dive) == 0.0
+    assert value("no_mission", dive) == 1.0
