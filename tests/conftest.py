@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections.abc import Callable
@@ -104,3 +105,9 @@ def care(capsys: pytest.CaptureFixture[str]) -> Care:
         return Outcome(code if isinstance(code, int) else 0 if code is None else 1, captured.out, captured.err)
 
     return call
+
+
+def pytest_collection_finish() -> None:
+    """Spare the collector what lives as long as the run: the modules and thousands of tests."""
+    gc.collect()
+    gc.freeze()
