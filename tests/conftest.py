@@ -108,6 +108,8 @@ def care(capsys: pytest.CaptureFixture[str]) -> Care:
 
 
 def pytest_collection_finish() -> None:
-    """Spare the collector what lives as long as the run: the modules and thousands of tests."""
+    """Spare the collector what lives as long as the run, modules and thousands of tests, and have it look less often:
+    it took a tenth of the time."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
