@@ -25,8 +25,8 @@ READS: Wanted = {"CTUN": ("ThO",), "PSCD": ("AD",), "ATT": ("Roll", "Pitch"), "B
 
 LIMITS = Limits()
 _STEEP = LIMITS.add(
-    "growth of thrust over that of throttle", 1.2, "",
-    "109 flights: at most 1.06 with MOT_THST_EXPO at 0.3 and more, 1.27 and more below -0.1",
+    "growth of thrust over that of throttle", 1.4, "",
+    "109 flights: at most 1.06 with MOT_THST_EXPO at 0.3 and more; good flights at -0.3 have 1.27",
 )  # fmt: skip
 _AGREE = LIMITS.add("least correlation of thrust and throttle", 0.8, "", "a choice: less is wind and noise")
 _VARIES = LIMITS.add("least relative change of the throttle", 0.015, "", "a choice: less is no climb or descent")
