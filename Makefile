@@ -10,13 +10,20 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check bench docs profiles screenshots man walk fuzz mutate damage kills matrix offline dist sbom clean
+.PHONY: demo test sweep check bench docs profiles screenshots man walk fuzz mutate damage kills matrix offline dist sbom clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
 
+# What is compiled once serves every process that a test starts, also where the environment asks to keep nothing.
+test sweep: export PYTHONDONTWRITEBYTECODE :=
+
 test: $(DEV)
 	$(BIN)/pytest -n 3 --dist worksteal
+
+# The same with everything that the tests take a sample of.
+sweep: $(DEV)
+	CARE_WHOLE=1 CARE_DAMAGE=200 CARE_KILLS=200 $(BIN)/pytest -n 3 --dist worksteal
 
 check: $(DEV)
 	$(BIN)/ruff check .
@@ -54,7 +61,7 @@ fuzz: $(DEV)
 mutate: $(DEV)
 	$(BIN)/python -m benchmarks.tools.mutating $(LOGS)
 
-# Each format cut at 200 places and with 200 flipped bits; the tests do with 50.
+# Each format cut at 200 places and with 200 flipped bits; the tests do with 25.
 damage: $(DEV)
 	CARE_DAMAGE=200 $(BIN)/pytest -q tests/integration/test_damage.py
 

@@ -97,6 +97,8 @@ class Robot(Record):
     """What says so."""
     is_sure: bool
     """Whether it tells this robot from others of its kind: a system id as delivered, or a model's name, does not."""
+    is_simulated: bool = False
+    """Whether it is a simulator's: every vehicle that this machine simulates has this id."""
 
 
 class LogInfo(Record):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections.abc import Callable
@@ -104,3 +105,11 @@ def care(capsys: pytest.CaptureFixture[str]) -> Care:
         return Outcome(code if isinstance(code, int) else 0 if code is None else 1, captured.out, captured.err)
 
     return call
+
+
+def pytest_collection_finish() -> None:
+    """Spare the collector what lives as long as the run, modules and thousands of tests, and have it look less often:
+    it took a tenth of the time."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)

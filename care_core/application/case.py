@@ -354,13 +354,12 @@ def _diagnose(reading: Reading, request: Request, robot: Robot | None, progress:
     from care_core.logs.opening import open_log
 
     progress("judging the objectives", 0.6)
-    log = reading.judged.run.log
     return triage(
         reading.judged,
         reading.profile,
         reading.choice,
         keep=request.keep,
-        since=last_good(robot, log) if request.since is None else open_log(request.since),
+        since=last_good(robot, reading.judged.run) if request.since is None else open_log(request.since),
         health=reading.health,
         top=request.top,
         progress=progress,

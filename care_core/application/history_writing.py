@@ -59,8 +59,17 @@ def terms_of(request: Request) -> str:
 
 def about_run(run: Run) -> About:
     """What the history keeps of a run beside its document."""
+    from care_core.configs.same_vehicle import individual
     from care_core.ecosystems.vehicles import is_self_written
     from care_core.history.store import About
 
-    settings = {name: setting.value for name, setting in run.settings.items() if not is_self_written(name)}
-    return About(run.log.robot, dict(run.mission.asked), run.log.facts.get("firmware", ""), settings, run.log.recording)
+    every = {name: setting.value for name, setting in run.settings.items()}
+    settings = {name: value for name, value in every.items() if not is_self_written(name)}
+    return About(
+        run.log.robot,
+        dict(run.mission.asked),
+        run.log.facts.get("firmware", ""),
+        settings,
+        run.log.recording,
+        individual=individual(every),
+    )

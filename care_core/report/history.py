@@ -240,7 +240,8 @@ def _name(robot: RobotRunsEntry) -> str:
 def _robot_lines(robot: RobotRunsEntry, ascii: bool, everything: bool) -> Iterator[str]:
     name = "Robot not known" if robot.robot is None else f"Robot {robot.robot.name}"
     source = "--robot NAME tells whose a log is" if robot.robot is None else robot.robot.source
-    doubt = ", others may share it" if robot.robot is not None and not robot.robot.is_sure else ""
+    is_shared = robot.robot is not None and (not robot.robot.is_sure or robot.robot.is_simulated)
+    doubt = ", others may share it" if is_shared else ""
     faulty = "none" if not robot.faulty else f"{robot.faulty} of them"
     yield from wrapped(f"{name} ({source}{doubt}): {_count(robot.runs, 'run')}, {faulty} with a fault")
     missions = [(n, one) for n, one in enumerate(robot.missions, 1) if everything or not _is_thin(one.trends)]

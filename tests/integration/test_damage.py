@@ -37,7 +37,7 @@ from tests.rewritten import write_ulog
 
 DATA = Path(__file__).parents[1] / "data"
 SECONDS = 10.0
-CUTS = FLIPS = int(os.environ.get("CARE_DAMAGE", "50"))
+CUTS = FLIPS = int(os.environ.get("CARE_DAMAGE", "25"))
 EVERY = 10
 """Of so many damaged logs one is diagnosed as well."""
 

@@ -25,7 +25,7 @@ from tests.killing import JOBS
 
 ROOT = Path(__file__).parents[2]
 FLIGHT = ROOT / "tests" / "data" / "arducopter_good.BIN"
-KILLS = int(os.environ.get("CARE_KILLS", "24"))
+KILLS = int(os.environ.get("CARE_KILLS", "14"))
 LONGEST_S = 0.6
 TARGETS = len(JOBS) + 2
 """The jobs, `care ingest` and `care collect`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -15,14 +15,15 @@ from care_core.files import bundled
 from care_core.report.document import build_document
 from tests.contradictions import contradictions
 from tests.restamped import dataflash_with
+from tests.whole import one_in
 
 DATA = Path(__file__).parents[1] / "data"
 SAMPLES = (
     "arducopter_failed.BIN", "arducopter_motor.BIN", "ardurover_failed.BIN", "move_base_drive.bag", "nav2_failed.mcap",
     "nav2_good.mcap", "nav2_stall.mcap", "owlat_failed.bag",
 )  # fmt: skip
-EVERY = 9
-"""Of the recorded runs with known truth so many are looked at one of; all are with 1."""
+WILD, KNOWN = 3, 9
+"""Of the logs from elsewhere, and of the recorded runs with known truth, one of so many is looked at."""
 
 
 def told_of(path: Path) -> list[str]:
@@ -71,4 +72,5 @@ def _recorded(folder: Path) -> Iterator[Path]:
     """Logs from elsewhere, and some of the runs whose truth is known."""
     known = sorted((*folder.glob("data/**/*.BIN"), *folder.glob("data/**/*.bag")))
     others = (wild_files(folder / name) for name in ("logs", "logs_known", "attack") if (folder / name).is_dir())
-    yield from chain(chain.from_iterable(others), islice(known, 0, None, EVERY))
+    yield from one_in(WILD, chain.from_iterable(others))
+    yield from one_in(KNOWN, known)

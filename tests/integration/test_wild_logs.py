@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import islice
 from pathlib import Path
 
 from benchmarks.wild_logs import outcome_of, wild_files
 from care_core.errors import ExitCode
 from tests.conftest import Care
+from tests.whole import one_in
 
 WENT_WELL = {"px4_events.ulg"}
 """A simulated take-off, return and landing."""
@@ -37,7 +37,7 @@ def test_no_configuration_file_is_taken_for_a_log(recorded: Path) -> None:
 
 
 def test_the_commands_say_it_in_one_sentence(care: Care, recorded: Path) -> None:
-    for path in islice(wild_files(recorded / "logs"), 0, None, EVERY):
+    for path in one_in(EVERY, wild_files(recorded / "logs")):
         for command in ("inspect", "params", "triage"):
             outcome = care(command, path)
             assert "Traceback" not in outcome.stderr, (command, path)

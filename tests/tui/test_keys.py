@@ -20,6 +20,7 @@ from care_tui.widgets.choices import Choices
 from care_tui.widgets.filter_bar import FilterBar
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, quiet, settle
+from tests.whole import one_in
 
 LEADS_OUT = {"q", "ctrl+c"}
 VIEWS = ("w", "m", "p", "y", "b", "v", "M", "L")
@@ -33,6 +34,11 @@ def keys_of(*bindings: Iterable[BindingType]) -> list[str]:
     return [key for key in dict.fromkeys(keys) if key not in LEADS_OUT]
 
 
+def strangers(page: int) -> list[BindingType]:
+    """What the keys of single pages do, one in three from another on each page: all are pressed on some page."""
+    return one_in(3, DOES, first=page % 3)
+
+
 HERE = (CareApp.BINDINGS, CaseScreen.BINDINGS)
 DOES = [binding for page in page_classes() for binding in page.BINDINGS]
 """What the keys of single pages do; on every other page they have to do nothing."""
@@ -43,6 +49,18 @@ async def leave_dialogs(pilot: Pilot[int]) -> None:
         await pilot.press("escape")
 
 
+def here(app: CareApp) -> str:
+    """The page in front."""
+    assert isinstance(app.screen, CaseScreen)
+    return app.screen.here
+
+
+def own(app: CareApp) -> list[BindingType]:
+    """What the keys of the page in front do."""
+    assert isinstance(app.screen, CaseScreen)
+    return app.screen.page.BINDINGS
+
+
 @pytest.mark.parametrize(
     ("step", "verdict"), [*((step, "faulty") for step in STEPS), ("3", "abstaining"), ("4", "all_ok")]
 )
@@ -50,11 +68,12 @@ async def test_no_key_fails_on_a_step(make_app: MakeApp, step: str, verdict: str
     app = make_app(getattr(sample, verdict)())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, step)
-        for key in keys_of(*HERE, DOES):
+        for key in keys_of(*HERE, own(app), strangers(int(step))):
             await pilot.press(key)
             await leave_dialogs(pilot)
             assert isinstance(app.screen, CaseScreen), key
-            await pilot.press(step)
+            if app.screen.here != NAMES[int(step) - 1]:
+                await pilot.press(step)
             assert app.screen.here == NAMES[int(step) - 1]
         await quiet(pilot)
         await settle(pilot, "q")
@@ -65,11 +84,14 @@ async def test_no_key_fails_on_a_step(make_app: MakeApp, step: str, verdict: str
 async def test_no_key_fails_on_a_view(make_app: MakeApp, view: str) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        for key in keys_of(*HERE, DOES, Choices.BINDINGS):
-            await leave_dialogs(pilot)
-            await settle(pilot, view)
+        await settle(pilot, view)
+        shown = here(app)
+        for key in keys_of(*HERE, own(app), strangers(VIEWS.index(view)), Choices.BINDINGS):
+            if here(app) != shown:
+                await settle(pilot, view)
             await pilot.press(key)
-        await leave_dialogs(pilot)
+            await leave_dialogs(pilot)
+            await quiet(pilot)
         await settle(pilot, "q")
     assert app.return_value is not None
 

@@ -28,10 +28,11 @@ from care_core.profile.store import load_profile
 from care_core.run import is_known
 from tests.rewritten import write_text, write_ulog
 from tests.unit.test_mavlink import Station, flight, parameter
+from tests.whole import WHOLE
 
 ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
-TIMES = 200
+TIMES = 200 if WHOLE else 60
 LONGEST_S = 10.0
 
 

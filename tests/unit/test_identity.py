@@ -126,6 +126,15 @@ def test_the_model_is_told_and_told_to_be_no_more() -> None:
     assert (robot.name, robot.is_sure) == ("husky\\x1b", False)
 
 
+def test_a_simulators_machine_is_told_to_be_shared() -> None:
+    machine = {"MSG": {"Message": np.array(["Dd1219c7c4c5404aaa1f6d2a48adfda4"] * 201, dtype=object)}}
+    made, real = (identify(Told(machine, told={"INS_ACC_ID": id})) for id in (2753028.0, 2621706.0))
+    assert made is not None
+    assert real is not None
+    assert (made.is_simulated, real.is_simulated) == (True, False)
+    assert made.source == "id of the machine that simulates it"
+
+
 def test_the_operator_knows_better() -> None:
     assert named(" no 7\x1b ").id == "no 7\\x1b"
 

@@ -26,8 +26,10 @@ from tests.made import TIME, made_diagnosis
 
 ROVER = Robot("R7", "R7", "named by the operator", is_sure=True)
 LOG = LogInfo("/logs/now.BIN", "dataflash-bin", "2026-05-02T10:00:00Z", 100.0, "f" * 64)
+RUN = replace(made_diagnosis().run, log=LOG, settings={})
 FINE = ObjectiveResult(TIME, 100.0, TIME.threshold, "ok")
 ROOT = Path(__file__).parents[2]
+UNTOLD = About()
 NONE: Mapping[str, float] = MappingProxyType({})
 
 
@@ -40,7 +42,7 @@ def history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> History:
 
 def remember(
     history: History, number: int, *, day: int = 1, robot: Robot = ROVER, result: ObjectiveResult = FINE,
-    findings: tuple[Finding, ...] = (), settings: Mapping[str, float] = NONE,
+    findings: tuple[Finding, ...] = (), settings: Mapping[str, float] = NONE, about: About = UNTOLD,
 ) -> None:  # fmt: skip
     """Puts a run of a day in May into the history."""
     made = made_diagnosis()
@@ -50,7 +52,7 @@ def remember(
         health=Health("", (), findings), missions=(),
     )  # fmt: skip
     document: dict[str, Any] = json.loads(json.dumps(published(build_document(diagnosis))))
-    history.add_triage(document, 1, About(robot, settings=settings))
+    history.add_triage(document, 1, replace(about, robot=robot, settings=settings))
 
 
 def test_the_last_run_before_the_log_in_which_nothing_failed_counts(history: History) -> None:
@@ -63,7 +65,7 @@ def test_the_last_run_before_the_log_in_which_nothing_failed_counts(history: His
     remember(history, 5, day=9, settings={"WP_JERK": 70.0})  # after it
     remember(history, 6, robot=replace(ROVER, id="R8"), settings={"WP_JERK": 80.0})
     remember(history, 7)  # its log held no parameters
-    found = last_good(ROVER, LOG)
+    found = last_good(ROVER, RUN)
     assert found is not None
     assert found["WP_JERK"].value == 1.0
 
@@ -71,15 +73,61 @@ def test_the_last_run_before_the_log_in_which_nothing_failed_counts(history: His
 def test_without_a_good_run_of_this_very_robot_nothing_is_known(
     history: History, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert last_good(ROVER, LOG) is None  # there is no history
+    assert last_good(ROVER, RUN) is None  # there is no history
     remember(history, 1, settings={"WP_JERK": 0.0})
-    assert last_good(None, LOG) is None
-    assert last_good(replace(ROVER, is_sure=False), LOG) is None
-    assert last_good(ROVER, replace(LOG, sha256=f"{1:064d}")) is None  # the same log
+    assert last_good(None, RUN) is None
+    assert last_good(replace(ROVER, is_sure=False), RUN) is None
+    assert last_good(ROVER, replace(RUN, log=replace(LOG, sha256=f"{1:064d}"))) is None  # the same log
     history.path.write_bytes(b"no database")
-    assert last_good(ROVER, LOG) is None
+    assert last_good(ROVER, RUN) is None
     monkeypatch.setenv("CARE_HISTORY", "off")
-    assert last_good(ROVER, LOG) is None
+    assert last_good(ROVER, RUN) is None
+
+
+VEHICLE = {"INS_ACC_ID": 2621706.0, "COMPASS_DEV_ID": 592905.0, "FRAME_CLASS": 1.0} | {
+    f"{name}_{axis}": 0.1 for name in ("INS_ACCOFFS", "COMPASS_OFS") for axis in "XYZ"
+}
+CHOSEN = {f"P{number}": float(number) for number in range(300)}
+
+
+@pytest.mark.parametrize(
+    ("firmware", "belongs", "changed", "is_same"),
+    [
+        ("ArduRover V4.5.4", {}, {"WP_JERK": 2.0}, True),
+        ("", {}, {}, True),
+        ("ArduRover V4.6.0", {}, {}, False),
+        ("ArduCopter V4.5.4", {}, {}, False),
+        ("ArduRover V4.5.4", {"FRAME_CLASS": 3.0}, {}, False),
+        ("ArduRover V4.5.4", {"INS_ACC_ID": 2753028.0}, {}, False),
+        ("ArduRover V4.5.4", {"COMPASS_OFS_X": 250.0}, {}, True),
+        ("ArduRover V4.5.4", {f"COMPASS_OFS_{axis}": 250.0 for axis in "XYZ"}, {}, True),
+        ("ArduRover V4.5.4", dict.fromkeys(list(VEHICLE)[3:], 7.0), {}, False),
+        ("ArduRover V4.5.4", {}, dict.fromkeys(list(CHOSEN)[:15], -1.0), True),
+        ("ArduRover V4.5.4", {}, dict.fromkeys(list(CHOSEN)[:60], -1.0), False),
+    ],
+)
+def test_a_good_run_is_of_this_vehicle_by_more_than_its_id(
+    history: History, firmware: str, belongs: Mapping[str, float], changed: Mapping[str, float], is_same: bool
+) -> None:
+    now = {name: Setting(name, value, "PARM") for name, value in {**CHOSEN, **VEHICLE}.items()}
+    run = replace(RUN, log=replace(LOG, facts={"firmware": "ArduRover V4.5.4"}), settings=now)
+    about = About(firmware=firmware, individual={**VEHICLE, **belongs})
+    remember(history, 1, settings={**CHOSEN, **changed}, about=about)
+    assert (last_good(ROVER, run) is not None) == is_same
+
+
+def test_what_a_machine_simulates_is_no_very_robot(history: History) -> None:
+    remember(history, 1, settings={"WP_JERK": 0.0})
+    assert last_good(replace(ROVER, is_simulated=True), RUN) is None
+
+
+def test_a_triage_leaves_what_tells_the_vehicle_from_others(history: History, care: Care) -> None:
+    care("triage", str(ROOT / "samples/ardurover_failed.BIN"))
+    (past,) = history.triages()
+    assert past.robot is not None
+    assert past.robot.is_simulated
+    assert past.individual["INS_ACC_ID"] == 2753028
+    assert "INS_GYROFFS_X" not in past.individual, "measured at every start"
 
 
 def test_what_a_vehicle_writes_itself_is_not_known_to_have_changed() -> None:

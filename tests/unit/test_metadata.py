@@ -13,6 +13,7 @@ from care_core.metadata.fact import expanded
 from care_core.metadata.words import word_of
 from care_core.run import Setting
 from care_core.variables import Role, Variable
+from tests.whole import one_in
 
 
 def test_a_parameter_of_a_vehicle_is_told_by_release() -> None:
@@ -38,11 +39,11 @@ def test_every_release_documents_hundreds_of_parameters(vehicle: str) -> None:
 def test_calibration_and_what_is_read_only_are_nobody_s_choice() -> None:
     listed = [
         fact
-        for name in ardupilot.names()
+        for name in one_in(3, ardupilot.names())
         for fact in ardupilot.facts_of(name)
         if fact.read_only and not name.startswith("VTX_")
     ]
-    assert len(listed) > 30
+    assert len(listed) > 10
     assert [fact.name for fact in listed if not is_self_written(fact.name)] == []
 
 

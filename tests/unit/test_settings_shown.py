@@ -142,6 +142,56 @@ def test_a_full_pack_of_any_chemistry_is_none(full: float) -> None:
     assert made.find() == ()
 
 
+def test_a_charged_pack_tells_its_cells_where_no_threshold_does() -> None:
+    made = MadeWithDefaults()
+    made.settings["BATT_LOW_VOLT"] = 0.0
+    made.drive("MOT_BAT_VOLT_MAX", 25.2, 0.0)
+    assert naming(made, "MOT_BAT_VOLT_MAX").wanted == (("MOT_BAT_VOLT_MAX", 12.6),)
+
+
+@pytest.mark.parametrize(("empty", "lost"), [(13.2, "not scaled"), (12.0, "hardly scaled")])
+def test_an_empty_pack_that_stands_near_the_full_one(empty: float, lost: str) -> None:
+    made = MadeWithDefaults()
+    made.drive("MOT_BAT_VOLT_MIN", empty, 0.0)
+    finding = naming(made, "MOT_BAT_VOLT_MIN")
+    assert finding.wanted == (("MOT_BAT_VOLT_MIN", 9.9),)
+    assert lost in finding.evidence
+
+
+@pytest.mark.parametrize("empty", [7.5, 9.9, 10.5, 11.1])
+def test_an_empty_pack_of_any_chemistry_is_none(empty: float) -> None:
+    made = MadeWithDefaults()
+    made.drive("MOT_BAT_VOLT_MIN", empty, 0.0)
+    assert made.find() == ()
+
+
+def climbs(slope: float, noise: float = 0.02) -> MadeWithDefaults:
+    """A flight that climbs and descends again and again, whose thrust grows so with its throttle."""
+    made = MadeWithDefaults()
+    flies = made.after(UP_S + 4, DOWN_S - 4)
+    swing = np.where(flies, 0.1 * np.sin(made.t), 0.0)
+    made.table["CTUN"]["ThO"] = np.where(flies, HOVER * np.exp(swing), made.table["CTUN"]["ThO"])
+    made.table["PSCD"] = {"AD": 9.81 - 9.81 * np.exp(slope * swing) + made.noise(noise * 9.81)}
+    return made
+
+
+def test_a_thrust_that_grows_faster_than_its_throttle_is_the_curves() -> None:
+    made = climbs(1.5)
+    made.drive("MOT_THST_EXPO", -0.3, 0.65)
+    finding = naming(made, "MOT_THST_EXPO")
+    assert (finding.severity, finding.wanted) == ("warning", (("MOT_THST_EXPO", 0.65),))
+    assert "thrust grows 1.5" in finding.evidence
+
+
+@pytest.mark.parametrize(
+    ("slope", "noise", "expo"), [(1.0, 0.02, 0.3), (0.6, 0.02, -0.3), (1.5, 0.3, -0.3), (1.5, 0.02, 0.65)]
+)
+def test_a_thrust_that_tells_no_wrong_curve(slope: float, noise: float, expo: float) -> None:
+    made = climbs(slope, noise)
+    made.drive("MOT_THST_EXPO", expo, 0.65)
+    assert not [one for one in made.find() if "MOT_THST_EXPO" in one.parameters]
+
+
 def energy_of(made: Made) -> Value:
     tables = made.tables()
     model = flight_of(tables, made.known, made.facts, END_S)

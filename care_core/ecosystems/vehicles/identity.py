@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from care_core.ecosystems.vehicles.settings import code
 from care_core.ecosystems.vehicles.vehicle import vehicle_of
 from care_core.logs.base import Log
-from care_core.run import Robot
+from care_core.records import replace
+from care_core.run import Robot, Setting
 from care_core.text import clean
 
 _SAID = {"MSG": ("Message",), "STATUSTEXT": ("text",), "AUTOPILOT_VERSION": ("uid2",)}
@@ -23,6 +24,9 @@ _SERIALS = ("BRD_SERIAL_NUM",)
 """Numbers that the owner gives a vehicle; 0 and below where none was given."""
 _SYSTEMS = ("SYSID_THISMAV", "MAV_SYSID", "MAV_SYS_ID")
 """Of ArduPilot to 4.6, ArduPilot from 4.7 on, PX4."""
+_SENSORS = ("INS_ACC_ID", "INS_GYR_ID", "INS1_ACC_ID", "INS4_ACC_ID")
+_BUS, _SIMULATED_BUS = 7, 4
+"""The lowest bits of a sensor's id are its bus, and one bus is that of a simulator (AP_HAL/Device.h: BUS_TYPE_SITL)."""
 _DELIVERED = 1
 """The system id that every vehicle comes with, so it tells none from another."""
 
@@ -35,7 +39,8 @@ def robots(log: Log) -> Iterator[Robot]:
         yield Robot(uuid, f"{clean(facts.get('hardware', 'PX4'))} {short}", "sys_uuid", is_sure=True)
     for name, table in log.read(_SAID).items():
         columns = (table.columns.get(field, ()) for field in _SAID[name])
-        yield from (robot for column in columns for value in column if (robot := _board(value)) is not None)
+        boards = (robot for column in columns for value in column if (robot := _board(value)) is not None)
+        yield from map(_simulated, boards) if _is_simulated(settings) else boards
     for name in _SERIALS:
         if (serial := code(settings, name) or 0) > 0:
             yield Robot(f"serial {serial}", f"serial {serial}", name, is_sure=True)
@@ -48,6 +53,16 @@ def robots(log: Log) -> Iterator[Robot]:
         kind = vehicle_of(facts, settings).kind
         name = f"{'vehicle' if kind == 'unknown' else kind} {number}"
         yield Robot(name, name, "system id as delivered", is_sure=False)
+
+
+def _is_simulated(settings: Mapping[str, tuple[Setting, ...]]) -> bool:
+    """Whether the sensors are a simulator's."""
+    ids = (code(settings, name) for name in _SENSORS)
+    return any(id & _BUS == _SIMULATED_BUS for id in ids if id)
+
+
+def _simulated(robot: Robot) -> Robot:
+    return replace(robot, source="id of the machine that simulates it", is_simulated=True)
 
 
 def _board(said: object) -> Robot | None:

@@ -29,7 +29,16 @@ from care_core.ecosystems.ardupilot.checks import (
     vibration,
     way_home,
 )
-from care_core.ecosystems.ardupilot.checks.settings import charge, driven, heading, hover, level, outputs, supply
+from care_core.ecosystems.ardupilot.checks.settings import (
+    charge,
+    driven,
+    heading,
+    hover,
+    level,
+    outputs,
+    supply,
+    thrust_curve,
+)
 from care_core.ecosystems.ardupilot.checks.wings import airspeed, propeller, surfaces
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
@@ -37,6 +46,7 @@ from care_core.ecosystems.base import Check
 CHECKS: tuple[Check[Flight], ...] = (
     heading.CHECK,
     hover.CHECK,
+    thrust_curve.CHECK,
     level.CHECK,
     supply.CHECK,
     charge.CHECK,

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.battery import FULL_V
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
@@ -21,7 +20,7 @@ from care_core.numbers import known_median, median
 from care_core.records import Record
 from care_core.run import shown
 
-READS: Wanted = {"CTUN": ("ThO", "Alt"), "BAT": ("Volt",), "RCOU": tuple(f"C{n}" for n in range(1, 9))}
+READS: Wanted = {"CTUN": ("ThO", "Alt"), "RCOU": tuple(f"C{n}" for n in range(1, 9))}
 
 LIMITS = Limits()
 _SPENT = LIMITS.add("throttle that lifts any vehicle", 0.6875, "", "AP_MotorsMulticopter.h: AP_MOTORS_THST_HOVER_MAX")
@@ -40,16 +39,12 @@ _SWINGS = LIMITS.add(
 _RAISED = LIMITS.add("times its default that a gain is raised", 1.5, "", "a choice")
 _HOVER = LIMITS.add("times MOT_THST_HOVER that hovering takes", 1.6, "", "a choice: loads and winds take less")
 _EDGE_S, _FEWEST = 4.0, 20
-_FULL_V, _LOW_CELL_V, _HIGHEST_V = "MOT_BAT_VOLT_MAX", 3.5, 4.25
 _SURE = LIMITS.add("probability that what ends the outputs keeps it down", 0.9, "", "both flights that stayed down so")
 _TOO_LITTLE = LIMITS.add(
     "range of the outputs that surely keeps it down", 0.65, "", "the flights that stayed down so had 0.6 to 0.65"
 )
 _UNSURE = LIMITS.add("the same where nearly all is left", 0.2, "", "0.75 flew where no motor was weak")
 _GAIN = LIMITS.add("probability of a raised gain", 0.8, "", "a choice: no healthy flight swings so")
-_PACK = LIMITS.add("cell of a pack that was charged", 4.1, "V", "cells of lithium polymer packs")
-_FULL_LEAST = LIMITS.add("full cell that MOT_BAT_VOLT_MAX may mean, least", 3.9, "V", "lithium ion: 4.1 V, iron: less")
-_FULL_MOST = LIMITS.add("full cell that MOT_BAT_VOLT_MAX may mean, most", 4.5, "V", "cells of high voltage: 4.35 V")
 _FEEDS = LIMITS.add("probability of a hover throttle that is wrong", 0.9, "", "it is measured")
 _FEEDS_LOST = LIMITS.add("probability that it costs the mission", 0.02, "", "0 of 4 flights at half and twice failed")
 _GAINS = (
@@ -77,7 +72,6 @@ def find(flight: Flight) -> Iterator[Finding]:
     yield from _kept_down(flight)
     yield from _swings(flight)
     yield from _hovers_elsewhere(flight)
-    yield from _another_pack(flight)
 
 
 def _kept_down(flight: Flight) -> Iterator[Finding]:
@@ -211,38 +205,9 @@ def _hovers_elsewhere(flight: Flight) -> Iterator[Finding]:
         )
 
 
-def _another_pack(flight: Flight) -> Iterator[Finding]:
-    """A voltage that the thrust is scaled by (AP_MotorsMulticopter: update_lift_max_from_batt_voltage) and that is none
-    of the pack which BATT_LOW_VOLT and the charged pack itself tell."""
-    battery, low, full = next(iter(flight.batteries), None), flight.setting("BATT_LOW_VOLT"), flight.setting(_FULL_V)
-    if battery is None or battery.rest_v is None or not low or not full or flight.default_left(_FULL_V) is None:
-        return
-    cells = round(low / _LOW_CELL_V)
-    if cells < 1 or not _PACK <= battery.rest_v / cells <= _HIGHEST_V or _FULL_LEAST <= full / cells <= _FULL_MOST:
-        return
-    yield Finding(
-        kind="tuning",
-        title=f"{_FULL_V} is of another pack",
-        onset_s=0.0,
-        end_s=flight.end_s,
-        severity="warning",
-        evidence=(
-            f"{battery.rest_v:.1f} V at rest is a full pack of the {cells} cells that BATT_LOW_VOLT={low:g} is for, "
-            f"and {_FULL_V}={full:g} is {full / cells:.2f} V a cell (limits {_FULL_LEAST:g} and {_FULL_MOST:g}): the "
-            "thrust is scaled for another voltage"
-        ),
-        source="BAT.Volt before take-off; PARM",
-        suspect="parameter",
-        probability=_FEEDS,
-        mission_lost=_FEEDS_LOST,
-        parameters=(_FULL_V,),
-        wanted=((_FULL_V, round(FULL_V * cells, 1)),),
-    )
-
-
 CHECK = Check(
     "hover settings",
-    "motors kept from their thrust, a throttle that swings or is fed or scaled wrongly",
+    "motors kept from their thrust, a throttle that swings or is fed wrongly",
     READS,
     LIMITS,
     find,

@@ -1,0 +1,16 @@
+"""What the default run takes a sample of: with `CARE_WHOLE` set, as `make sweep` does, it is all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from itertools import islice
+from typing import TypeVar
+
+T = TypeVar("T")
+WHOLE = bool(os.environ.get("CARE_WHOLE"))
+
+
+def one_in(every: int, items: Iterable[T], first: int = 0) -> list[T]:
+    """One of so many items, from the one at `first` on; all in a whole run."""
+    return list(items) if WHOLE else list(islice(items, first, None, every))
