@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Generator, Iterable
@@ -23,6 +24,7 @@ from textual.screen import Screen
 from care_core.application.case import Case, Request
 from care_core.diagnose.verdict import verdict_of
 from care_core.errors import CareError, ExitCode, UsageError, nearest
+from care_core.text import clean
 from care_tui.engine import Engine
 from care_tui.hangup import on_hangup
 from care_tui.link import Link, linked
@@ -262,4 +264,6 @@ def run(request: Request | None, settings: Settings) -> int:
     shorten()
     app = CareApp(request, settings=settings)
     answer = app.run(mouse=settings.mouse)
+    for file in dict.fromkeys(app.workspace.written):
+        print(f"wrote {clean(str(file))}", file=sys.stderr)
     return int(ExitCode.USAGE if answer is None else answer)

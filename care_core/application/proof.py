@@ -19,6 +19,8 @@ Meaning = Callable[[str, str], Field]
 _POSITION = re.compile(r"position\.|(^|\.)(latitude|longitude|altitude)$")
 """Fields of ROS messages that say where a robot was, of whatever type."""
 _WORD = re.compile(r"/[\w/]+|\w+")
+_AXES = {"roll": "_RLL_", "pitch": "_PIT_", "yaw": "_YAW_"}
+"""How the gains of an axis are named that ArduPilot has."""
 _MOTOR = re.compile(r"motor (\d+)")
 _SHOWN_BY: Mapping[FindingKind, str] = {
     "motor": "motor",
@@ -92,10 +94,12 @@ def proof_of(case: OpenRun, subject: Subject, signals: Sequence[Signal] | None =
 
 
 def _finding_of(case: OpenRun, cause: Cause) -> Finding | Cause:
-    """The finding that names the cause's option, else the cause."""
+    """The finding that names the cause's option, or of a gain that its axis swings, else the cause."""
     names = {cause.option.name, *cause.option.parameters}
-    findings = every_finding(case.diagnosis.health.findings)
-    return next((one for one in findings if names & set(one.parameters)), cause)
+    findings = tuple(every_finding(case.diagnosis.health.findings))
+    axes = {axis for axis, part in _AXES.items() if any(part in name for name in names)}
+    swings = (one for one in findings if one.kind == "tuning" and axes & set(_WORD.findall(one.title.casefold())))
+    return next((one for one in findings if names & set(one.parameters)), next(swings, cause))
 
 
 def _score(subject: Subject, signal: Signal, field: Field) -> float:

@@ -273,6 +273,9 @@ class CausesPage(DiagnosisPage):
         """Open or close the statistics."""
         self._is_open = not self._is_open
         self.show_text(from_top=False)
+        if self._is_open:
+            for reader in self.query(Reader):
+                reader.reveal("Statistics")
 
     def action_next_fault(self) -> None:
         """Turn to the causes of the next faulty objective."""

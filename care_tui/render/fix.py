@@ -37,7 +37,11 @@ def option_item(
         line += Content.styled("  ! reboot", "$text-warning")
     if alone is None:
         return line
-    return line.pad_right(max(width + CHANGE - line.cell_length, 2)) + promise(alone, glyphs, BAR) + Content(" alone")
+    return (
+        line.pad_right(max(width + CHANGE - line.cell_length, 2))
+        + promise(alone, glyphs, BAR)
+        + Content(" if only this")
+    )
 
 
 def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs) -> list[Row]:
