@@ -127,6 +127,8 @@ def finding_score(finding: Finding, signal: Signal, field: Field) -> float:
     if signal.channel.casefold() in named:
         return 5.0 - 0.2 * named.index(signal.channel.casefold()) + told - 1.5 * field.is_position
     seen_in = _overlap(field, set(_SHOWN_BY.get(finding.kind, "").split()))
+    # Where turning is the matter, the speed ahead shows nothing of it.
+    seen_in += 2 * _overlap(field, title & {"turn"})
     return 0.5 * seen_in if seen_in and not field.is_position else 0.0
 
 

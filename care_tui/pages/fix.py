@@ -60,13 +60,13 @@ class FixPage(DiagnosisPage):
         options, alone = session.options(), session.alone()
         width = min(max((len(clean(option.name)) for option in options), default=0), NAME_WIDTH)
 
-        def item(index: int, _width: int) -> tuple[Content]:
+        def item(index: int, room: int) -> tuple[Content]:
             option = options[index]
             value = basket.values.get(option.name)
             odds = None if value is None else alone.get((option.name, value))
             ticked = option.name in basket.ticked
             current, is_assumed = session.current(option), session.is_assumed(option)
-            return (option_item(option, current, is_assumed, value, ticked, odds, width, glyphs),)
+            return (option_item(option, current, is_assumed, value, ticked, odds, width, glyphs, room),)
 
         index, session.option = self._place(options), None
         listing = Listing(len(options), item, lambda i: f"{options[i].name} {options[i].doc}")

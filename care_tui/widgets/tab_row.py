@@ -47,9 +47,10 @@ class TabRow(Static):
         self._draw()
 
     def _draw(self) -> None:
-        content = joined([self._tab(page, page.title) for page in self._pages], " ")
+        gap = "" if self._pad else " "
+        content = joined([self._tab(page, page.title) for page in self._pages], gap)
         if content.cell_length > (self.content_size.width or self.app.size.width):
-            content = joined([self._tab(page, page.short) for page in self._pages], " ")
+            content = joined([self._tab(page, page.short) for page in self._pages], gap)
         if not content.is_same(self._shown):
             self._shown = content
             self.update(content, layout=False)
