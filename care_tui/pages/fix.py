@@ -66,7 +66,7 @@ class FixPage(DiagnosisPage):
             odds = None if value is None else alone.get((option.name, value))
             ticked = option.name in basket.ticked
             current, is_assumed = session.current(option), session.is_assumed(option)
-            return (option_item(option, current, is_assumed, value, ticked, odds, width, glyphs, room),)
+            return (option_item(option, current, is_assumed, value, ticked, odds, width, glyphs, room=room),)
 
         index, session.option = self._place(options), None
         listing = Listing(len(options), item, lambda i: f"{options[i].name} {options[i].doc}")

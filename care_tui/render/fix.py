@@ -19,7 +19,7 @@ BAR, CHANGE, ODDS = 6, 32, 26
 """Cells of the bar of the odds alone, those behind the name before it, and all that the odds take."""
 
 
-def option_item(
+def option_item(  # noqa: PLR0913
     option: Variable,
     current: float | None,
     is_assumed: bool,
@@ -28,6 +28,7 @@ def option_item(
     alone: float | None,
     width: int,
     glyphs: Glyphs,
+    *,
     room: int = 80,
 ) -> Content:
     """One option of the basket on one line: its box, its name padded to `width`, its change, and the odds of it alone,
