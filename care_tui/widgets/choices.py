@@ -44,7 +44,7 @@ class Choices(Pane):
         Binding("pageup,ctrl+u", "cursor_page(-1)", "Page up", show=False, id="text.page-up"),
     ]
 
-    class Said(Message):
+    class ListEvent(Message):
         """What the operator did in a list."""
 
         def __init__(self, choices: Choices) -> None:
@@ -55,10 +55,10 @@ class Choices(Pane):
         def control(self) -> Choices:
             return self.choices
 
-    class Moved(Said):
+    class Moved(ListEvent):
         """The cursor was moved."""
 
-    class Chosen(Said):
+    class Chosen(ListEvent):
         """The item under the cursor was clicked."""
 
     def __init__(self, glyphs: Glyphs, *, id: str | None = None) -> None:
