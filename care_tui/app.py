@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Generator, Iterable
@@ -16,14 +17,14 @@ from typing import ClassVar
 from textual.app import App, SystemCommand
 from textual.binding import ActiveBinding, Binding, BindingType
 from textual.driver import Driver
-from textual.events import CursorPosition, Paste
+from textual.events import CursorPosition, Paste, Resize
 from textual.reactive import Reactive
 from textual.screen import Screen
-from textual.scrollbar import ScrollBar, ScrollBarRender
 
 from care_core.application.case import Case, Request
 from care_core.diagnose.verdict import verdict_of
 from care_core.errors import CareError, ExitCode, UsageError, nearest
+from care_core.text import clean
 from care_tui.engine import Engine
 from care_tui.hangup import on_hangup
 from care_tui.link import Link, linked
@@ -45,12 +46,6 @@ _LOOK_S = 2.0
 """How often an app in a browser looks for its server."""
 _FREE_S = 0.05
 """How often is looked whether the terminal has shown the last frame, where it does not say so itself."""
-
-
-class PlainScrollBar(ScrollBarRender):
-    """A scroll bar without block characters, which not every terminal has."""
-
-    VERTICAL_BARS: ClassVar[list[str]] = [" "] * 8
 
 
 class CareApp(App[int], inherit_bindings=False):
@@ -78,7 +73,6 @@ class CareApp(App[int], inherit_bindings=False):
         super().__init__()
         settings = settings or Settings()
         self.animation_level = "none"
-        ScrollBar.renderer = PlainScrollBar
         self.register_theme(HIGH_CONTRAST)
         if settings.theme:
             if settings.theme not in self.available_themes:
@@ -178,6 +172,9 @@ class CareApp(App[int], inherit_bindings=False):
             self._held.close()
             self.screen.check_idle()
 
+    def on_resize(self, event: Resize) -> None:
+        self.link.width = event.size.width
+
     def on_cursor_position(self, _event: CursorPosition) -> None:
         self.link.answered()
         self.release()
@@ -216,7 +213,9 @@ class CareApp(App[int], inherit_bindings=False):
     def action_help(self) -> None:
         screen = self.screen
         if isinstance(screen, CaseScreen):
-            self.push_screen(HelpScreen(screen.page.HELP, self._keys_of(screen), screen.page.help_first()))
+            self.push_screen(
+                HelpScreen(self.workspace.glyphs, screen.page.HELP, self._keys_of(screen), screen.page.help_first())
+            )
 
     def _keys_of(self, screen: CaseScreen) -> Keys:
         """Every key that works on the screen, keys of one action together, those of the page first."""
@@ -265,4 +264,6 @@ def run(request: Request | None, settings: Settings) -> int:
     shorten()
     app = CareApp(request, settings=settings)
     answer = app.run(mouse=settings.mouse)
+    for file in dict.fromkeys(app.workspace.written):
+        print(f"wrote {clean(str(file))}", file=sys.stderr)
     return int(ExitCode.USAGE if answer is None else answer)

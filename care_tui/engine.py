@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, open_case, predict
-from care_core.application.configuring import DiffSide, apply_to_files, commands_of, diff_of
+from care_core.application.configuring import DiffSide, apply_to_files, commands_of, diff_of, doubts_of
 from care_core.application.history_writing import remember_triage
 from care_core.application.reporting import report_of
 from care_core.errors import CareError
@@ -58,6 +58,7 @@ class Engine(Record):
     remember: Callable[[Diagnosis, Request], CareError | None] = remember_triage
     compare: Callable[[Request, Request, Progress], str] = comparison_of
     apply: Callable[[Case, Fix], list[tuple[Path, Path]]] = apply_to_files
+    doubts: Callable[[Case, Fix], tuple[str, ...]] = doubts_of
 
 
 def as_care_error(err: Exception) -> CareError:

@@ -16,6 +16,8 @@ from typing import Any
 
 from textual.driver import Driver
 
+from care_tui.frames import lean
+
 ASK = "\x1b[6n"
 """Report the position of the cursor (DSR, ECMA-48 section 8.3.35)."""
 _LOST_S = 2.0
@@ -33,6 +35,8 @@ class Link:
 
     def __init__(self, is_full: Callable[[], bool] = _takes_nothing) -> None:
         self.write: Callable[[str], None] | None = None
+        self.width = 0
+        """Cells across the terminal; 0 where that is not known yet."""
         self._is_full = is_full
         self._answers = False
         self._asked_s: float | None = None
@@ -65,5 +69,8 @@ def linked(driver: type[Driver], link: Link) -> type[Driver]:
         def __init__(self, *args: Any, **kwargs: Any) -> None:
             super().__init__(*args, **kwargs)
             link.write = None if self.is_headless or self.is_web else self.write
+
+        def write(self, data: str) -> None:
+            super().write(lean(data, link.width))
 
     return Linked

@@ -9,6 +9,15 @@ from care_core.records import Record
 Need = Literal["nothing", "log", "diagnosis"]
 
 
+_SHORT = {
+    "messages": "Msgs",
+    "history": "Hist",
+    "contents": "Cont",
+    "missions": "Miss",
+    "profiles": "Prof",
+}
+
+
 class PageInfo(Record):
     """A page: its name in the code, the keys that lead to it, its title, and what it shows."""
 
@@ -19,9 +28,14 @@ class PageInfo(Record):
     needs: Need = "diagnosis"
 
     @property
-    def label(self) -> str:
-        """What its tab says: the key and the title."""
-        return f"{self.keys.rsplit(',', 1)[-1]} {self.title}"
+    def key(self) -> str:
+        """The key that its tab names."""
+        return self.keys.rsplit(",", 1)[-1]
+
+    @property
+    def short(self) -> str:
+        """The title where the terminal is too narrow for all of them."""
+        return _SHORT.get(self.name, self.title)
 
 
 STEPS = (

@@ -41,6 +41,7 @@ class Session(Struct, eq=False):
     """The signals of the log, once somebody asked for them."""
     dismissed: dict[str, str] = field(default_factory=dict)
     """Causes set aside: option to reason."""
+    _options: list[Variable] | None = None
     _before_aside: dict[str, dict[str, float]] = field(default_factory=dict)
     """Options that left the fix when they were set aside, with what was ticked before."""
     format: Format = FILE_FORMATS[0]
@@ -66,7 +67,7 @@ class Session(Struct, eq=False):
 
     def take(self, case: Case) -> None:
         """A diagnosis has come: start at its first fault, with the suggested fix in the basket."""
-        self.case = case
+        self.case, self._options = case, None
         names = [result.variable.name for result in case.diagnosis.objectives]
         statuses = [result.status for result in case.diagnosis.objectives]
         self.objective = statuses.index("fault") if "fault" in statuses else 0
@@ -174,6 +175,11 @@ class Session(Struct, eq=False):
 
     def options(self) -> list[Variable]:
         """Every option, those that the engine would change first."""
+        if self._options is None:
+            self._options = self._sorted_options()
+        return self._options
+
+    def _sorted_options(self) -> list[Variable]:
         known = {option.name: option for option in (self.case.options if self.case else ())}
         for fix in fixes(self.diagnosis):
             known |= {change.option.name: change.option for change in fix.changes}

@@ -20,6 +20,8 @@ class Workspace(Struct, eq=False):
     glyphs: Glyphs
     request: Request | None = None
     session: Session = field(default_factory=Session)
+    written: list[Path] = field(default_factory=list)
+    """Files that were written, for the terminal to name when the app is left."""
     folder: Path | None = None
     """The folder of logs that was named instead of one."""
 

@@ -386,10 +386,10 @@ def decided(diagnosis: Diagnosis, fix: Fix | None, dismissed: Mapping[str, str])
 
 def weighed_without(diagnosis: Diagnosis, dismissed: Collection[str]) -> Diagnosis:
     """The diagnosis with what explains the failure, given that these parameters do not."""
-    from care_core.diagnose.hypotheses import hypotheses_of
-
     if diagnosis.failure is None or not dismissed:
         return diagnosis
+    from care_core.diagnose.hypotheses import hypotheses_of
+
     left = diagnosis.failure.without(dismissed)
     return replace(diagnosis, failure=left, hypotheses=hypotheses_of(left))
 

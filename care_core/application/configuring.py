@@ -189,11 +189,31 @@ def edited_by(case: Case, fix: Fix) -> tuple[EditedFile, ...]:
     from care_core.configs.edit import Wanted, apply_changes
 
     wanted = [
-        Wanted(change.option, parameter, parameter_value(change.option, change.suggested))
+        Wanted(
+            change.option,
+            parameter,
+            parameter_value(change.option, change.suggested),
+            None if change.is_assumed else parameter_value(change.option, change.current),
+        )
         for change in fix.changes
         for parameter in readable(change.option)
     ]
     return apply_changes([str(name) for name in case.configs], wanted)
+
+
+def doubts_of(case: Case, fix: Fix) -> tuple[str, ...]:
+    """Why the operator's files may be those of another robot, and what else is to be known before the fix is put into
+    them. Raises ConfigError."""
+    notes = [
+        f"{', '.join(edit.parameters)}: {note}"
+        for file in edited_by(case, fix)
+        for edit in file.edits
+        for note in edit.notes
+    ]
+    others = len(_file_against_driven(case).splitlines())
+    if others:
+        notes.append(f"{others} parameters of the file are not what the robot ran")
+    return tuple(dict.fromkeys(notes))
 
 
 def apply_to_files(case: Case, fix: Fix) -> list[tuple[Path, Path]]:

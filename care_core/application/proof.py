@@ -19,6 +19,8 @@ Meaning = Callable[[str, str], Field]
 _POSITION = re.compile(r"position\.|(^|\.)(latitude|longitude|altitude)$")
 """Fields of ROS messages that say where a robot was, of whatever type."""
 _WORD = re.compile(r"/[\w/]+|\w+")
+_AXES = {"roll": "_RLL_", "pitch": "_PIT_", "yaw": "_YAW_"}
+"""How the gains of an axis are named that ArduPilot has."""
 _MOTOR = re.compile(r"motor (\d+)")
 _SHOWN_BY: Mapping[FindingKind, str] = {
     "motor": "motor",
@@ -94,10 +96,12 @@ def proof_of(case: OpenRun, subject: Subject, signals: Sequence[Signal] | None =
 
 
 def _finding_of(case: OpenRun, cause: Cause) -> Finding | Cause:
-    """The finding that names the cause's option, else the cause."""
+    """The finding that names the cause's option, or of a gain that its axis swings, else the cause."""
     names = {cause.option.name, *cause.option.parameters}
-    findings = every_finding(case.diagnosis.health.findings)
-    return next((one for one in findings if names & set(one.parameters)), cause)
+    findings = tuple(every_finding(case.diagnosis.health.findings))
+    axes = {axis for axis, part in _AXES.items() if any(part in name for name in names)}
+    swings = (one for one in findings if one.kind == "tuning" and axes & set(_WORD.findall(one.title.casefold())))
+    return next((one for one in findings if names & set(one.parameters)), next(swings, cause))
 
 
 def _score(subject: Subject, signal: Signal, field: Field) -> float:
@@ -125,6 +129,8 @@ def finding_score(finding: Finding, signal: Signal, field: Field) -> float:
     if signal.channel.casefold() in named:
         return 5.0 - 0.2 * named.index(signal.channel.casefold()) + told - 1.5 * field.is_position
     seen_in = _overlap(field, set(_SHOWN_BY.get(finding.kind, "").split()))
+    # Where turning is the matter, the speed ahead shows nothing of it.
+    seen_in += 2 * _overlap(field, title & {"turn"})
     return 0.5 * seen_in if seen_in and not field.is_position else 0.0
 
 

@@ -77,6 +77,8 @@ class AccountPage(DiagnosisPage):
         """Open or close the details of the run."""
         self._is_open = not self._is_open
         self.show_text(from_top=False)
+        if self._is_open:
+            self.reader.reveal("This run")
 
     def action_pick(self) -> None:
         """Choose another log."""

@@ -73,11 +73,11 @@ class CausesPage(DiagnosisPage):
 
     def compose(self) -> ComposeResult:
         with Container(id="left"):
-            yield Choices(self.glyphs.more, id="list")
-            side = Reader(id="side")
+            yield Choices(self.glyphs, id="list")
+            side = Reader(self.glyphs, id="side")
             side.border_title = "Path and fix"
             yield side
-        yield Reader(id="text")
+        yield Reader(self.glyphs, id="text")
 
     def view_of_diagnosis(self) -> View:
         ranked = self.ranked()
@@ -273,6 +273,9 @@ class CausesPage(DiagnosisPage):
         """Open or close the statistics."""
         self._is_open = not self._is_open
         self.show_text(from_top=False)
+        if self._is_open:
+            for reader in self.query(Reader):
+                reader.reveal("Statistics")
 
     def action_next_fault(self) -> None:
         """Turn to the causes of the next faulty objective."""

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.page_names import NAMES, PAGES
 from care_tui.pages.page import Page, View, sentence
@@ -26,8 +27,7 @@ class DiagnosisPage(Page):
         if session.state == "data":
             if self.NAME not in session.empty_steps():
                 return self.view_of_diagnosis()
-            why = "No mission was flown" if session.diagnosis.run.checks else "No profile fits this log"
-            return View(title, lambda _: sentence(f"{why}, so {self.NOTHING}. 1 tells what happened."))
+            return View(title, lambda _: sentence(f"{_why(session)}, so {self.NOTHING}. 1 tells what happened."))
         if session.error is not None:
             return View(title, lambda _: failure_rows(session))
         says = "No log is open. L leads to the logs." if session.state == "empty" else "The log is being read."
@@ -63,6 +63,14 @@ class DiagnosisPage(Page):
     def action_open(self) -> None:
         """Go on."""
         self.go_on()
+
+
+def _why(session: Session) -> str:
+    """Why nothing is judged: a profile that is missing comes before a mission that was not flown."""
+    fit = session.diagnosis.profile.fit
+    if fit.verdict == "no":
+        return f"No profile fits this log ({clean(fit.reasons[0])})" if fit.reasons else "No profile fits this log"
+    return "No mission was flown"
 
 
 def failure_rows(session: Session) -> Rows:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.content import Content
 
+from care_core.application.case import changes_of
 from care_core.application.configuring import DiffSide
 from care_core.errors import CareError
 from care_core.records import replace
@@ -17,7 +19,7 @@ from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to, sentence
 from care_tui.places import as_path
 from care_tui.render.fix import no_fix_rows
-from care_tui.render.rows import Rows, command_rows, diff_rows, error_rows
+from care_tui.render.rows import Rows, command_rows, diff_rows, error_rows, percent
 from care_tui.screens.confirm import Confirm
 from care_tui.screens.prompt import Prompt
 
@@ -26,7 +28,7 @@ SIDES: dict[DiffSide, str] = {
     "file": "Your file (-) against suggested (+)",
     "changed": "As driven (-) against your file (+)",
 }
-DIFF, APPLY = "diff", "apply"
+DIFF, APPLY, DOUBTS = "diff", "apply", "doubts"
 
 
 def _not_a_file(typed: str) -> str:
@@ -128,11 +130,27 @@ class DiffPage(DiagnosisPage):
         elif not case.configs:
             self._ask_for_file(to_apply=True)
         else:
-            files = ", ".join(str(name) for name in case.configs)
-            question = f"Put {len(fix.changes)} change{'s' if len(fix.changes) > 1 else ''} into {files}?"
-            self.app.push_screen(
-                Confirm(question, "y writes it and keeps the old one as .bak, n or Esc leaves it"), self._confirmed
-            )
+            self.ask(DOUBTS, lambda: self.workspace.engine.doubts(case, fix))
+
+    def _confirm(self, doubts: Sequence[str]) -> None:
+        """Ask before anything is written: with the odds, how sure the cause is, and what speaks against it."""
+        case, fix, session = self.session.case, self.session.fix, self.session
+        if case is None or fix is None:
+            return
+        files = ", ".join(str(name) for name in case.configs)
+        odds = "" if fix.odds is None else f" The next run is then without a fault with {percent(fix.odds)}."
+        question = f"Put {len(fix.changes)} change{'s' if len(fix.changes) > 1 else ''} into {files}?{odds}"
+        changed = set(changes_of(fix))
+        sure = {cause.confidence for fault in session.diagnosis.faults for cause in fault.causes
+                if cause.option.name in changed}  # fmt: skip
+        cautions = (
+            [f"confidence is {', '.join(sorted(sure))}: try it where nothing can be hurt first"]
+            if sure - {"high"}
+            else []
+        )
+        cautions += [f"{change.option.name}: {note}" for change in fix.changes for note in change.notes]
+        keys = "y writes it and keeps the old one as .bak, n or Esc leaves it"
+        self.app.push_screen(Confirm(question, keys, [*doubts, *cautions]), self._confirmed)
 
     def _confirmed(self, answer: bool | None) -> None:
         case, fix = self.session.case, self.session.fix
@@ -140,11 +158,17 @@ class DiffPage(DiagnosisPage):
             self.ask(APPLY, lambda: self.workspace.engine.apply(case, fix))
 
     def take(self, question: str, answer: object) -> None:
-        if question != APPLY:
+        if question == DOUBTS:
+            if isinstance(answer, CareError):
+                self.say(str(answer))
+            elif isinstance(answer, tuple):
+                self._confirm(answer)
+        elif question != APPLY:
             super().take(question, answer)
         elif isinstance(answer, CareError):
             self.say(str(answer))
         elif isinstance(answer, list):
+            self.workspace.written += [file for file, _ in answer]
             told = "; ".join(f"wrote {clean(str(file))}, the old one is {backup.name}" for file, backup in answer)
             self.say(told or "The file holds these values already.")
             self._turn("file")

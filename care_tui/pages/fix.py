@@ -29,8 +29,9 @@ class FixPage(DiagnosisPage):
     NOTHING = "no change is suggested"
     HELP = (
         "Space ticks a change, + and - nudge its value, = types one. The odds follow at once, here and in the answer "
-        "above. a loads the next alternative, s the suggestion, u takes the last change back. Every parameter of the "
-        "profile is here: / finds it. Enter shows the diff. Nothing is written to the robot."
+        "above; those at a line are of the next run if only this parameter is changed. a loads the next alternative, s "
+        "the suggestion, u takes the last change back. Every parameter of the profile is here: / finds it. Enter shows "
+        "the diff. Nothing is written to the robot."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Diff"),
@@ -59,13 +60,13 @@ class FixPage(DiagnosisPage):
         options, alone = session.options(), session.alone()
         width = min(max((len(clean(option.name)) for option in options), default=0), NAME_WIDTH)
 
-        def item(index: int, _width: int) -> tuple[Content]:
+        def item(index: int, room: int) -> tuple[Content]:
             option = options[index]
             value = basket.values.get(option.name)
             odds = None if value is None else alone.get((option.name, value))
             ticked = option.name in basket.ticked
             current, is_assumed = session.current(option), session.is_assumed(option)
-            return (option_item(option, current, is_assumed, value, ticked, odds, width, glyphs),)
+            return (option_item(option, current, is_assumed, value, ticked, odds, width, glyphs, room=room),)
 
         index, session.option = self._place(options), None
         listing = Listing(len(options), item, lambda i: f"{options[i].name} {options[i].doc}")

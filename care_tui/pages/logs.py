@@ -154,14 +154,26 @@ class LogsPage(Page):
         found = self._answers.get(LOGS)
         return found if isinstance(found, list) else []
 
+    def _named(self, path: Path) -> Content:
+        """The name of a log, with the folders between it and the folder that was named, of which the end tells most."""
+        named, inside = text(path.name, "bold"), self.workspace.folder
+        between = path.parent.relative_to(inside) if inside and path.is_relative_to(inside) else Path()
+        room = NAME_WIDTH - named.cell_length - 1
+        if named.cell_length > NAME_WIDTH:
+            return named.truncate(NAME_WIDTH - 1) + self.glyphs.more
+        if between == Path() or room < 2:
+            return named
+        folders = clean(str(between))
+        if len(folders) > room:
+            folders = self.glyphs.more + folders[len(folders) - room + 1 :]
+        return Content.assemble((f"{folders}/", "dim"), named)
+
     def _item(self, log: LogFile, now: float, width: int) -> Content:
         mark = self.glyphs.here if log.path == self.session.path else " "
         known = self._known.get(log.path)
         verdict = Content("") if known is None else _status(known.status, self)
         about = f" {age(now - log.modified_s):>10}  {size(log.size):>8}  "
-        named = text(log.path.name, "bold")
-        if named.cell_length > NAME_WIDTH:
-            named = named.truncate(NAME_WIDTH - 1) + self.glyphs.more
+        named = self._named(log.path)
         line = Content.assemble(
             f"{mark} ",
             verdict.pad_right(VERDICT_WIDTH - verdict.cell_length),

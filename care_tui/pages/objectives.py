@@ -89,6 +89,8 @@ class ObjectivesPage(DiagnosisPage):
         """Open or close the details of the run."""
         self._is_open = not self._is_open
         self.show_text(from_top=False)
+        if self._is_open:
+            self.reader.reveal("This run")
 
     def action_type_threshold(self) -> None:
         """Judge the objective under the cursor by a limit of one's own."""

@@ -11,7 +11,6 @@ from textual.binding import Binding, BindingType
 from textual.containers import Container
 from textual.content import Content
 from textual.events import Resize
-from textual.widgets import OptionList
 from textual.worker import get_current_worker
 
 from care_core.application.proof import Subject
@@ -20,7 +19,7 @@ from care_core.records import Record
 from care_core.text import clean
 from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Answered, Go
-from care_tui.render.rows import Glyphs, Row, Rows, error_rows
+from care_tui.render.rows import Glyphs, Row, Rows, cut, error_rows
 from care_tui.session import Session
 from care_tui.widgets.choices import NOTHING, Choices, Listing
 from care_tui.widgets.reader import Reader
@@ -62,8 +61,8 @@ class Page(Container):
         self._asked: set[str] = set()
 
     def compose(self) -> ComposeResult:
-        yield Choices(self.glyphs.more, id="list")
-        yield Reader(id="text")
+        yield Choices(self.glyphs, id="list")
+        yield Reader(self.glyphs, id="text")
 
     @property
     def session(self) -> Session:
@@ -141,7 +140,7 @@ class Page(Container):
         self._show_text(self._view, from_top=from_top)
 
     def _show_text(self, view: View, *, from_top: bool = True) -> None:
-        if self.reader.size or not self.FITS:  # else it is drawn when its size is known
+        if self.reader.has_room or not self.FITS:  # else it is drawn when its size is known
             self.reader.show(view.detail(self.index), from_top=from_top)
 
     def _show_titles(self) -> None:
@@ -149,14 +148,14 @@ class Page(Container):
         choices, reader = self.choices, self.reader
         first, about = self._view.title, Content(clean(self._view.about))
         for pane, title in ((choices, first), (reader, about if choices.display else first)):
-            room = (pane.size.width or self.app.size.width) - 6
-            cut = title if title.cell_length <= room else title.truncate(max(room - 1, 1)) + self.glyphs.more
-            if pane.border_title != cut.markup:
-                pane.border_title = cut.markup
+            room = (pane.outer_size.width or self.app.size.width) - 6
+            shown = cut(title, room, self.glyphs).markup
+            if pane.border_title != shown:
+                pane.border_title = shown
 
     def take_focus(self) -> None:
         """Focus the list where there is one, else the text."""
-        (self.choices if self.choices.display else self.reader).focus(scroll_visible=False)
+        self.screen.set_focus(self.choices if self.choices.display else self.reader, scroll_visible=False)
 
     def filter(self, words: str) -> None:
         """Show only what holds these words."""
@@ -170,8 +169,8 @@ class Page(Container):
         """Tell something in passing."""
         self.app.notify(clean(words), timeout=4, markup=False)
 
-    @on(OptionList.OptionHighlighted, "#list")
-    def _follow(self, event: OptionList.OptionHighlighted) -> None:
+    @on(Choices.Moved, "#list")
+    def _follow(self, event: Choices.Moved) -> None:
         event.stop()
         self._follow_cursor()
 
@@ -181,12 +180,11 @@ class Page(Container):
             self.moved(index)
         self.show_text()
 
-    @on(OptionList.OptionSelected, "#list")
-    async def _chosen(self, event: OptionList.OptionSelected) -> None:
-        """A click moves the cursor, and goes on where it was there already."""
+    @on(Choices.Chosen, "#list")
+    async def _chosen(self, event: Choices.Chosen) -> None:
+        """A click goes on where the cursor was there already."""
         event.stop()
-        if event.option_index == self.choices.clicked_on:
-            await self.run_action("open")
+        await self.run_action("open")
 
     @on(Reader.Fitted)
     def _fit(self, event: Reader.Fitted) -> None:

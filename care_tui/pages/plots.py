@@ -66,8 +66,8 @@ class PlotsPage(Page):
         self.forget(PROOF)
         if moment_s is not None and not self._span[0] <= moment_s <= self._span[1]:
             self._span = min(self._span[0], moment_s), max(self._span[1], moment_s)
-        if self.is_mounted and self.choices.option_count:
-            self.choices.highlighted = 0  # the signal that proves it comes first
+        if self.is_mounted:
+            self.choices.move_to(0)  # the signal that proves it comes first
 
     def view(self) -> View:
         case, subject, session = self._case, self._subject, self.session

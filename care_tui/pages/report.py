@@ -73,6 +73,7 @@ class ReportPage(DiagnosisPage):
     def _exported(self, path: str | None) -> None:
         if path is not None:
             written = Path(path)
+            self.workspace.written.append(written)
             self._written = str(written.relative_to(Path.cwd()) if written.is_relative_to(Path.cwd()) else written)
             self.show()
 

@@ -15,11 +15,11 @@ from care_tui.basket import possible
 from care_tui.render.odds import promise
 from care_tui.render.rows import Glyphs, Row, Rows, change_text, heading, measure, padded, text, warning
 
-BAR, CHANGE = 6, 32
-"""Cells of the bar of the odds alone, and those behind the name before it."""
+BAR, CHANGE, ODDS = 6, 32, 26
+"""Cells of the bar of the odds alone, those behind the name before it, and all that the odds take."""
 
 
-def option_item(
+def option_item(  # noqa: PLR0913
     option: Variable,
     current: float | None,
     is_assumed: bool,
@@ -28,8 +28,11 @@ def option_item(
     alone: float | None,
     width: int,
     glyphs: Glyphs,
+    *,
+    room: int = 80,
 ) -> Content:
-    """One option of the basket on one line: its box, its name padded to `width`, its change, the odds of it alone."""
+    """One option of the basket on one line: its box, its name padded to `width`, its change, and the odds of it alone,
+    which are not cut off in `room` cells."""
     box = ("[x]" if ticked else "[ ]") if value is not None else "   "
     change = change_text(option, current, is_assumed, value, glyphs)
     line = Content.assemble(f"{box} ", padded(option.name, width + 2, "bold" if ticked else ""), change)
@@ -37,7 +40,11 @@ def option_item(
         line += Content.styled("  ! reboot", "$text-warning")
     if alone is None:
         return line
-    return line.pad_right(max(width + CHANGE - line.cell_length, 2)) + promise(alone, glyphs, BAR) + Content(" alone")
+    return (
+        line.pad_right(max(min(width + CHANGE, room - ODDS) - line.cell_length, 2))
+        + promise(alone, glyphs, BAR)
+        + Content(" if only this")
+    )
 
 
 def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs) -> list[Row]:

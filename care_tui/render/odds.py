@@ -13,7 +13,7 @@ LIKELY, EVEN = 0.8, 0.5
 
 def bar(share: float, glyphs: Glyphs, width: int = WIDTH, style: str = "$text-accent") -> Content:
     """So much of the width is filled; a share that is not nothing fills a cell."""
-    filled = min(max(round(share * width), 1 if share >= 0.005 else 0), width)
+    filled = min(max(round(share * width), 1 if share > 0 else 0), width)
     return Content.assemble((glyphs.done * filled, style), (glyphs.ahead * (width - filled), "dim"))
 
 

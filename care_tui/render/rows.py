@@ -45,6 +45,7 @@ class Glyphs(Record):
     root: str
     line: str
     down: str
+    up: str
     done: str
     ahead: str
     more: str
@@ -62,6 +63,7 @@ UNICODE = Glyphs(
     root="●",
     line="│",
     down="▼",
+    up="▲",
     done="█",
     ahead="░",
     more="…",
@@ -78,6 +80,7 @@ ASCII = Glyphs(
     root="*",
     line="|",
     down="v",
+    up="^",
     done="#",
     ahead=".",
     more="~",
@@ -158,6 +161,11 @@ def _breaks(plain: str, first_width: int, width: int) -> list[int]:
 def text(value: str, style: str = "") -> Content:
     """Foreign text, cleaned, in one style."""
     return Content.styled(clean(value), style) if style else Content(clean(value))
+
+
+def cut(line: Content, width: int, glyphs: Glyphs) -> Content:
+    """The line where it fits, else its beginning with the sign for more."""
+    return line if line.cell_length <= width else line.truncate(max(width - 1, 1)) + glyphs.more
 
 
 def joined(parts: Iterable[Content], gap: str) -> Content:

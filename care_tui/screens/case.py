@@ -49,6 +49,8 @@ ROOMY = 30
 """From this height on panes have a frame, below it only a line above."""
 STEPS_WIDTH, SHORTEST_NAME = 59, 12
 """Cells that the tabs of the steps take, and below which the name of a log tells nothing."""
+_SETTLED_S = 0.001
+"""What a step changes is drawn after so long: by then every widget has said what it wants painted."""
 DIAGNOSIS, PREDICTION = "diagnosis", "prediction"
 
 
@@ -92,13 +94,13 @@ class CaseScreen(Screen[None]):
         too_small = f"Terminal too small: {MIN_WIDTH} x {MIN_HEIGHT} is needed. q quits."
         yield Static(too_small, id="too-small", markup=False)
         with Horizontal(id="steps"):
-            yield TabRow(STEPS, id="step-tabs")
+            yield TabRow(STEPS, pad=" ", id="step-tabs")
             yield Static(id="log-name", markup=False)
         yield TabRow(VIEWS, id="view-tabs")
         yield AnswerBar(self.workspace.glyphs)
         yield ContentSwitcher(id="pages")
         yield FilterBar()
-        yield Keys()
+        yield Keys(self.workspace.glyphs)
 
     async def on_mount(self) -> None:
         request = self.workspace.request
@@ -136,16 +138,30 @@ class CaseScreen(Screen[None]):
             await switcher.mount(make_page(name, self.workspace, id))
         self.here = name
         page = cast("Page", switcher.get_child_by_id(id))
+        # As large as the one before at once: a size that is news would have the screen laid out and painted twice.
+        page.set_reactive(Widget.virtual_size, switcher.size)
         if is_new or moment_s is not None or subject is not None:
             page.look_at(moment_s, subject)
-        batch = ExitStack()
-        batch.enter_context(self.app.batch_update())
+        turning = ExitStack()
+        turning.callback(self.check_idle)
+        turning.enter_context(self.app.batch_update())
         switcher.current = id
         page.enter()
         page.show(index)
         page.take_focus()
         self._mark()
-        self.call_later(batch.close)  # when the panes know of their focus: one frame, not one for each
+        self.query_one(Keys).tell(cast("Screen[object]", self))
+        self.set_timer(_SETTLED_S, turning.close)
+
+    async def _prepare(self) -> None:
+        """Make the next page that the operator will turn to while there is nothing else to do, hidden."""
+        switcher = self.query_one(ContentSwitcher)
+        missing = [name for name in NAMES if not switcher.query(f"#{self._page_id(name)}")]
+        if missing and self.session.case is not None:
+            page = make_page(missing[0], self.workspace, self._page_id(missing[0]))
+            page.display = False
+            await switcher.mount(page)
+            self.call_after_refresh(self._prepare)
 
     def _mark(self) -> None:
         session = self.session
@@ -325,6 +341,7 @@ class CaseScreen(Screen[None]):
         verdict = verdict_of(diagnosis)
         for logs in self.query(LogsPage):
             logs.learned(answer.log.path if answer.log else self.session.path or Path(), verdict.status, verdict.failed)
+        self.call_after_refresh(self._prepare)
         # What happened is the answer where no profile fits, or a part of it that comes first where one failed.
         stays = diagnosis.profile.fit.verdict == "no" or _has_failed_part(diagnosis.health)
         if self.here == "log" and not stays:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -22,11 +23,14 @@ class Confirm(ModalScreen[bool]):
         Binding("n,escape", "dismiss(False)", "No", id="confirm.no"),
     ]
 
-    def __init__(self, question: str, keys: str) -> None:
+    def __init__(self, question: str, keys: str, doubts: Sequence[str] = ()) -> None:
+        """Args: doubts: what speaks against a yes."""
         super().__init__()
-        self._question, self._keys = question, keys
+        self._question, self._keys, self._doubts = question, keys, tuple(doubts)
 
     def compose(self) -> ComposeResult:
         with Vertical(classes="dialog small"):
             yield Static(Content.styled(clean(self._question), "bold"))
+            for doubt in self._doubts:
+                yield Static(Content.styled(f"! {clean(doubt)}", "$text-warning"))
             yield Static(self._keys, classes="hint", markup=False)

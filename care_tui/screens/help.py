@@ -12,7 +12,7 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from care_tui.render.rows import Row, Rows
+from care_tui.render.rows import Glyphs, Row, Rows
 from care_tui.widgets.reader import Reader
 
 Keys = Iterable[tuple[str, str, str]]
@@ -26,9 +26,10 @@ class HelpScreen(ModalScreen[None]):
         Binding("escape,q,question_mark,f1,enter", "dismiss", "Close", id="help.close"),
     ]
 
-    def __init__(self, about: str, keys: Keys, first: Iterable[Row] = ()) -> None:
+    def __init__(self, glyphs: Glyphs, about: str, keys: Keys, first: Iterable[Row] = ()) -> None:
         """Args: first: what the help begins with."""
         super().__init__()
+        self._glyphs = glyphs
         self._about = about
         self._first = tuple(first)
         self._keys = tuple(keys)
@@ -42,4 +43,4 @@ class HelpScreen(ModalScreen[None]):
         ]
         with Vertical(classes="dialog"):
             yield Static("Keys that work here (Esc closes)", classes="title", markup=False)
-            yield Reader(Rows(rows), id="help")
+            yield Reader(self._glyphs, Rows(rows), id="help")

@@ -42,7 +42,7 @@ class OpenLogDialog(ModalScreen[Path | None]):
             yield Static("Open a log", classes="title", markup=False)
             yield box
             yield Static("Up and Down choose, Tab completes, Enter opens, Esc goes back", classes="hint", markup=False)
-            yield Choices(self._glyphs.more, id="entries")
+            yield Choices(self._glyphs, id="entries")
             yield Static(classes="error", markup=False)
 
     def on_mount(self) -> None:
@@ -65,8 +65,7 @@ class OpenLogDialog(ModalScreen[Path | None]):
         return text(f"{path.name}/", "bold") if path.is_dir() else text(path.name)
 
     def action_move(self, by: int) -> None:
-        choices = self.query_one(Choices)
-        choices.action_cursor_down() if by > 0 else choices.action_cursor_up()
+        self.query_one(Choices).action_cursor(by)
 
     def action_complete(self) -> None:
         """Put the entry under the cursor into the line."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from textual.widgets import Static
 
 from care_tui.render.answer import answer_lines
-from care_tui.render.rows import Glyphs, joined
+from care_tui.render.rows import Glyphs, cut, joined
 from care_tui.session import Session
 
 
@@ -28,8 +28,6 @@ class AnswerBar(Static):
     def _draw(self) -> None:
         width = self.content_size.width or self.app.size.width - 2
         lines = answer_lines(self._session, self._glyphs, width, is_low=self.app.size.height < 24)
-        more = self._glyphs.more
-        cut = [line.truncate(width - 1) + more if line.cell_length > width else line for line in lines]
-        content = joined(cut, "\n")
+        content = joined([cut(line, width, self._glyphs) for line in lines], "\n")
         if content != self.content:
             self.update(content, layout=content.plain.count("\n") != str(self.content).count("\n"))

@@ -7,21 +7,13 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.content import Content
-from textual.css.styles import RulesMap
-from textual.events import Resize
-from textual.reactive import reactive
-from textual.strip import Strip
-from textual.style import Style
-from textual.visual import RenderOptions, Visual
-from textual.widgets import OptionList
-from textual.widgets.option_list import Option
+from textual.events import Click, Resize
+from textual.geometry import Size
+from textual.message import Message
 
 from care_core.records import Record
-
-SCROLL_KEYS: list[BindingType] = [
-    Binding("pagedown,ctrl+f", "page_down", "Page down", show=False, id="text.page-down"),
-    Binding("pageup,ctrl+u", "page_up", "Page up", show=False, id="text.page-up"),
-]
+from care_tui.render.rows import Glyphs, cut
+from care_tui.widgets.pane import MARGIN, Pane
 
 
 class Listing(Record):
@@ -39,59 +31,58 @@ class Listing(Record):
 NOTHING = Listing(0, lambda _index, _width: (), lambda _index: "")
 
 
-class _Lines(Visual):
-    """So many lines, for Textual to count: `Choices` draws them itself."""
-
-    def __init__(self, height: int) -> None:
-        self._height = height
-
-    def render_strips(self, width: int, height: int | None, style: Style, options: RenderOptions) -> list[Strip]:
-        return [Strip.blank(width, style.rich_style)] * self._height
-
-    def get_optimal_width(self, rules: RulesMap, container_width: int) -> int:
-        return container_width
-
-    def get_minimal_width(self, rules: RulesMap) -> int:
-        return 1
-
-    def get_height(self, rules: RulesMap, width: int) -> int:
-        return self._height
-
-
-class Choices(OptionList, inherit_bindings=False):
-    """Textual's option list for long lists: it stops at its ends, never wraps an item, and paints only the lines that
-    changed. Enter is left to the page."""
+class Choices(Pane):
+    """It stops at its ends and cuts its items off, and has no widget or option for an item: a profile has hundreds.
+    Enter is left to the page."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("down,j", "cursor_down", "Next", show=False, id="list.down"),
-        Binding("up,k", "cursor_up", "Previous", show=False, id="list.up"),
-        Binding("home,g", "first", "First", show=False, id="list.first"),
-        Binding("end,G", "last", "Last", show=False, id="list.last"),
-        *SCROLL_KEYS,
+        Binding("down,j", "cursor(1)", "Next", show=False, id="list.down"),
+        Binding("up,k", "cursor(-1)", "Previous", show=False, id="list.up"),
+        Binding("home,g", "cursor_to_end(-1)", "First", show=False, id="list.first"),
+        Binding("end,G", "cursor_to_end(1)", "Last", show=False, id="list.last"),
+        Binding("pagedown,ctrl+f", "cursor_page(1)", "Page down", show=False, id="text.page-down"),
+        Binding("pageup,ctrl+u", "cursor_page(-1)", "Page up", show=False, id="text.page-up"),
     ]
-    highlighted: reactive[int | None] = reactive(None, repaint=False)
 
-    def __init__(self, more: str, *, id: str | None = None) -> None:
-        """`more` stands for what is cut off."""
-        super().__init__(id=id, markup=False)
-        self._more = more
+    class ListEvent(Message):
+        """What the operator did in a list."""
+
+        def __init__(self, choices: Choices) -> None:
+            super().__init__()
+            self.choices = choices
+
+        @property
+        def control(self) -> Choices:
+            return self.choices
+
+    class Moved(ListEvent):
+        """The cursor was moved."""
+
+    class Chosen(ListEvent):
+        """The item under the cursor was clicked."""
+
+    def __init__(self, glyphs: Glyphs, *, id: str | None = None) -> None:
+        super().__init__(glyphs, id=id)
         self.listing = NOTHING
+        self.highlighted: int | None = None
+        """Place of the cursor among the items that are shown."""
         self._shown: list[int] = []
-        self._height = 0
         self._filter = ""
-        self._painted: dict[int, Content] = {}
-        self.clicked_on: int | None = None
-        """Where the cursor was when the mouse was clicked last."""
 
     @property
     def index(self) -> int | None:
-        """The item under the cursor, counted from 0 before filtering."""
+        """The item under the cursor, before filtering."""
         return None if self.highlighted is None or not self._shown else self._shown[self.highlighted]
+
+    @property
+    def shown_count(self) -> int:
+        """Items that the filter leaves."""
+        return len(self._shown)
 
     @property
     def plain(self) -> str:
         """The items as shown, one line each."""
-        width = max(self.scrollable_content_region.width - 2, 60)
+        width = max(self.room.width, 60)
         return "\n".join(line.plain for index in self._shown for line in self.listing.item(index, width))
 
     def show(self, listing: Listing, index: int | None = None) -> None:
@@ -109,77 +100,75 @@ class Choices(OptionList, inherit_bindings=False):
         return True
 
     def _fill(self, index: int | None) -> None:
-        count, words, height = self.listing.count, self.listing.words, self.listing.height
-        shown = [i for i in range(count) if not self._filter or self._filter in words(i).casefold()]
-        with self.prevent(OptionList.OptionHighlighted):
-            if (len(shown), height) != (self.option_count, self._height):
-                self._height = height
-                self.set_options(Option(_Lines(height)) for _ in shown)
-            self._shown = shown
-            self.highlighted = None if not shown else shown.index(index) if index in shown else 0
-        self.scroll_to_highlight()
-        self._paint()
+        count, words, before = self.listing.count, self.listing.words, self.line_count
+        self._shown = [i for i in range(count) if not self._filter or self._filter in words(i).casefold()]
+        self.highlighted = None if not self._shown else self._shown.index(index) if index in self._shown else 0
+        if self.line_count != before:
+            self.refresh(layout=True)
+        self._scroll_to_cursor()
+        self.paint()
 
-    def _paint(self) -> None:
-        """Have the lines in view painted that are not what was painted last."""
-        before, self._painted = self._painted, {}
-        for row in range(self.size.height):
-            y = self.scroll_offset.y + row
-            line = self._line(y)
-            if y not in before or not before[y].is_same(line):
-                self.refresh_lines(y)
+    # As a pane
 
-    def _line(self, y: int) -> Content:
-        """Line y of the list, cut off at the width; empty below its end."""
-        place, part = divmod(y, self.listing.height)
-        width = self.scrollable_content_region.width - 2
-        if place >= len(self._shown) or width < 1:
-            return Content()
-        line = self.listing.item(self._shown[place], width)[part]
-        if line.cell_length > width:
-            line = line.truncate(width - 1) + self._more
-        if place == self.highlighted and self.has_focus:  # grey on the bar of the cursor is a patch
+    @property
+    def line_count(self) -> int:
+        return len(self._shown) * self.listing.height
+
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        return self.line_count
+
+    def line(self, place: int) -> Content:
+        item, part = divmod(place, self.listing.height)
+        width = self.room.width - 1
+        line = self.listing.item(self._shown[item], width)[part]
+        line = cut(line, width, self.glyphs)
+        if item != self.highlighted:
+            return line.pad_left(1)
+        if self.has_focus:  # grey on the bar of the cursor is a patch
             line = Content(line.plain, [span for span in line.spans if span.style != "dim"])
-        return line.pad(1, 1).pad_right(width - line.cell_length)
-
-    def render_line(self, y: int) -> Strip:
-        y += self.scroll_offset.y
-        line, style = self._line(y), self.visual_style
-        self._painted[y] = line
-        place = y // self.listing.height
-        if place == self.highlighted:
-            # Reversed: status colours stay legible, and a terminal without colours shows it too.
-            style += Style(bold=True, reverse=self.has_focus)
-        if not line.plain:
-            return Strip.blank(self.size.width, self.visual_style.rich_style)
-        strip = Visual.to_strips(self, line, line.cell_length, 1, style)[0]
-        return strip.simplify().apply_meta({"option": place})
-
-    def on_click(self) -> None:
-        self.clicked_on = self.highlighted
+        bar = line.pad_left(1).pad_right(width + MARGIN - line.cell_length)
+        # Reversed: status colours stay legible, and a terminal without colours shows it too.
+        return bar.stylize("bold reverse" if self.has_focus else "bold")
 
     def on_resize(self, event: Resize) -> None:
-        event.prevent_default()  # Textual would paint all of it
-        self.scroll_to_highlight()
-        self._paint()
+        super().on_resize(event)
+        self._scroll_to_cursor()
 
-    def watch_highlighted(self, before: int | None, highlighted: int | None) -> None:  # type: ignore[override]
-        super().watch_highlighted(highlighted)
-        for place in (before, highlighted):
-            if place is not None:
-                self.refresh_lines(place * self.listing.height, self.listing.height)
-
-    def scroll_to_highlight(self, top: bool = False) -> None:
+    def _scroll_to_cursor(self) -> None:
         """Half a page at a time: every line moves then, which a slow link should not pay for at every key."""
-        height, visible = self.listing.height, self.scrollable_content_region.height
+        height, visible = self.listing.height, self.room.height
         first = (self.highlighted or 0) * height
-        if visible and not self.scroll_offset.y <= first <= self.scroll_offset.y + visible - height:
-            self.scroll_to(y=max(first - visible // 2, 0), animate=False, immediate=True)
+        if not self.has_room:
+            return
+        if not self.top <= first <= self.top + visible - height:
+            self.scroll_to_line(first - visible // 2)
+        self.scroll_to_line(self.top)
 
-    def action_cursor_down(self) -> None:
-        if self.highlighted is not None and self.highlighted < len(self._shown) - 1:
-            super().action_cursor_down()
+    # What the operator does
 
-    def action_cursor_up(self) -> None:
-        if self.highlighted:
-            super().action_cursor_up()
+    def move_to(self, place: int) -> None:
+        """Put the cursor on one of the items that are shown, the last where there are fewer."""
+        place = min(max(place, 0), len(self._shown) - 1)
+        if self._shown and place != self.highlighted:
+            self.highlighted = place
+            self._scroll_to_cursor()
+            self.paint()
+            self.post_message(self.Moved(self))
+
+    def action_cursor(self, by: int) -> None:
+        self.move_to((self.highlighted or 0) + by)
+
+    def action_cursor_page(self, by: int) -> None:
+        self.move_to((self.highlighted or 0) + by * max(self.room.height // self.listing.height, 1))
+
+    def action_cursor_to_end(self, by: int) -> None:
+        self.move_to(by * len(self._shown))
+
+    def on_click(self, event: Click) -> None:
+        """A click moves the cursor, and chooses where it was there already."""
+        at = event.get_content_offset(self)
+        place = -1 if at is None else (self.top + at.y) // self.listing.height
+        if place == self.highlighted:
+            self.post_message(self.Chosen(self))
+        elif 0 <= place < len(self._shown):
+            self.move_to(place)

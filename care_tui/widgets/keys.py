@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
-from itertools import zip_longest
-from typing import Any, cast
-
+from textual.content import Content
 from textual.screen import Screen
-from textual.widgets import Footer
+from textual.style import Style
+from textual.widgets import Static
+
+from care_tui.render.rows import Glyphs, cut, joined
 
 
-class Keys(Footer):
-    """Textual's footer. Its keys are labelled anew where other ones come to work: to make them anew costs more than all
-    the rest of a step."""
+class Keys(Static):
+    """One text, where Textual's footer has a widget for each key: those are laid out anew at each step, which costs
+    more than all the rest of it. A click on a key presses it."""
 
-    def __init__(self) -> None:
-        super().__init__(show_command_palette=False, compact=True)
+    def __init__(self, glyphs: Glyphs) -> None:
+        super().__init__(markup=False)
+        self._glyphs = glyphs
+        self._keys = Content()
 
-    def bindings_changed(self, screen: Screen[object]) -> None:
+    def on_mount(self) -> None:
+        self.screen.bindings_updated_signal.subscribe(self, self.tell)
+
+    def tell(self, screen: Screen[object]) -> None:
+        """Show the keys that work now."""
         shown = {
             one.binding.action: one.binding for one in reversed(screen.active_bindings.values()) if one.binding.show
         }
-        bindings, keys = list(reversed(shown.values())), list(self.query("FooterKey"))
-        if len(keys) < len(bindings):
-            super().bindings_changed(screen)
-            return
-        for widget, binding in zip_longest(keys, bindings):
-            widget.display = binding is not None
-            key = cast("Any", widget)
-            if binding is not None and (key.key, key.description) != (binding.key, binding.description):
-                key.key, key.action, key.description = binding.key, binding.action, binding.description
-                key.key_display = self.app.get_key_display(binding)
-                key.refresh(layout=True)
+        keys = [
+            Content.assemble(
+                (self.app.get_key_display(binding), "bold $footer-key-foreground"), f" {binding.description}"
+            ).stylize(Style.from_meta({"@click": f"app.simulate_key('{binding.key}')"}))
+            for binding in reversed(shown.values())
+        ]
+        content = cut(joined(keys, "  "), self.size.width or self.app.size.width, self._glyphs)
+        if not self._keys.is_same(content):
+            self._keys = content
+            self.update(content, layout=False)

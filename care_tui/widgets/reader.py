@@ -7,29 +7,23 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.events import Resize
-from textual.geometry import Region, Size
 from textual.message import Message
-from textual.scroll_view import ScrollView
 from textual.strip import Strip
-from textual.visual import Visual
 
-from care_tui.render.rows import Row, Rows
-from care_tui.widgets.choices import SCROLL_KEYS
-
-_STEP = 5
-"""Lines by which a text that does not fit grows."""
+from care_tui.render.rows import Glyphs, Rows
+from care_tui.widgets.pane import Pane
 
 
-class Reader(ScrollView, can_focus=True, inherit_bindings=False):
-    """A scrollable text. Another one repaints only the lines that differ: a slow link pays for no more."""
+class Reader(Pane):
+    """A text, as rows that are wrapped."""
 
-    ALLOW_SELECT = False
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("down,j", "scroll_down", "Scroll down", show=False, id="text.down"),
-        Binding("up,k", "scroll_up", "Scroll up", show=False, id="text.up"),
-        Binding("home,g", "scroll_home", "To the top", show=False, id="text.top"),
-        Binding("end,G", "scroll_end", "To the bottom", show=False, id="text.bottom"),
-        *SCROLL_KEYS,
+        Binding("down,j", "scroll(1)", "Scroll down", show=False, id="text.down"),
+        Binding("up,k", "scroll(-1)", "Scroll up", show=False, id="text.up"),
+        Binding("home,g", "scroll_to_end(-1)", "To the top", show=False, id="text.top"),
+        Binding("end,G", "scroll_to_end(1)", "To the bottom", show=False, id="text.bottom"),
+        Binding("pagedown,ctrl+f", "scroll_page(1)", "Page down", show=False, id="text.page-down"),
+        Binding("pageup,ctrl+u", "scroll_page(-1)", "Page up", show=False, id="text.page-up"),
     ]
 
     class Fitted(Message):
@@ -43,8 +37,8 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
         def control(self) -> Reader:
             return self.reader
 
-    def __init__(self, rows: Rows | None = None, *, id: str | None = None) -> None:
-        super().__init__(id=id)
+    def __init__(self, glyphs: Glyphs, rows: Rows | None = None, *, id: str | None = None) -> None:
+        super().__init__(glyphs, id=id)
         self._rows = rows or Rows([])
         self._filter = ""
         self._lines: list[Content] = []
@@ -56,26 +50,20 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
         return "\n".join(row.content.plain for row in self._kept().rows)
 
     @property
-    def room(self) -> Size:
-        """Cells that a text may fill without being wrapped or scrolled."""
-        return Size(max(self.scrollable_content_region.width, 10), max(self.size.height, 1))
+    def line_count(self) -> int:
+        return len(self._lines)
+
+    def line(self, place: int) -> Content:
+        return self._lines[place]
 
     def show(self, rows: Rows, *, from_top: bool = True) -> None:
         """Replace the text."""
         self._rows = rows
-        if from_top and self.scroll_offset.y:
-            self.scroll_to(y=0, animate=False, immediate=True)
-        if not self.size:  # it is hidden: wrapped when it is drawn
-            self._width = 0
-            return
-        before = self._lines
         self._wrap()
-        top = self.scroll_offset.y
-        for row in range(self.size.height):
-            old, new = _line(before, top + row), _line(self._lines, top + row)
-            if not old.is_same(new):
-                self.refresh(Region(0, row, max(old.cell_length, new.cell_length), 1))
-        self.call_after_refresh(self._fit)  # with the size that it will have then
+        if from_top:
+            self.top = 0
+        self.scroll_to_line(self.top)
+        self.paint()
 
     def filter(self, words: str) -> None:
         """Show only the rows that hold these words; all of them when empty."""
@@ -83,42 +71,38 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
             self._filter = words.casefold()
             self.show(self._rows)
 
+    def reveal(self, words: str) -> None:
+        """Scroll to the line with these words, where what follows it is not all in view."""
+        place = next((place for place, line in enumerate(self._lines) if words in line.plain), None)
+        if place is not None and self.line_count > self.top + self.room.height:
+            self.scroll_to_line(place)
+
     def _kept(self) -> Rows:
         if not self._filter:
             return self._rows
         return Rows(row for row in self._rows.rows if self._filter in row.content.plain.casefold())
 
     def _wrap(self) -> None:
-        self._width = self.room.width
-        self._lines = self._kept().wrap(self._width)
-
-    def _fit(self) -> None:
-        """Have as much to scroll as there is. A new size has the pane painted, so it changes seldom."""
-        if not self.size:  # it is hidden
-            return
-        count, room = len(self._lines), self.room
-        size = Size(room.width, -(-count // _STEP) * _STEP) if count > room.height else Size(0, 0)
-        if size != self.virtual_size:
-            self.virtual_size = size
+        self._width = self.room.width if self.has_room else 0
+        self._lines = self._kept().wrap(self._width) if self._width else []  # else when it is drawn
 
     def on_resize(self, event: Resize) -> None:
-        if not self.size:
-            return
         if self._width != self.room.width:
             self._wrap()
             self.refresh()
-        self._fit()
+        super().on_resize(event)
         self.post_message(self.Fitted(self))
 
     def render_line(self, y: int) -> Strip:
         if self._width != self.room.width:  # drawn before it is told of its new size: right at once, not twice
             self._wrap()
-        width, style = self.size.width, self.visual_style
-        line = _line(self._lines, self.scroll_offset.y + y)
-        if not line.plain:
-            return Strip.blank(width, style.rich_style)
-        return Visual.to_strips(self, Rows([Row(line)]), width, 1, style, pad=True)[0].simplify()
+        return super().render_line(y)
 
+    def action_scroll(self, by: int) -> None:
+        self.scroll_to_line(self.top + by)
 
-def _line(lines: list[Content], place: int) -> Content:
-    return lines[place] if place < len(lines) else Content()
+    def action_scroll_page(self, by: int) -> None:
+        self.scroll_to_line(self.top + by * self.room.height)
+
+    def action_scroll_to_end(self, by: int) -> None:
+        self.scroll_to_line(by * self.line_count)

@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from textual.widgets import Input, Static, Tabs
+from textual.widgets import Input, Static
 
 from care_core.application.case import Case, Request
 from care_core.errors import UsageError
@@ -18,6 +18,7 @@ from care_tui.render.plot import dots_across, plot
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
 from care_tui.settings import Settings
+from care_tui.widgets.tab_row import TabRow
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
@@ -48,7 +49,7 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         assert choices.has_focus, "the list takes the focus when it appears"
         assert choices.index is not None
         assert choices.index > 1000
-        assert choices.scroll_offset.y > 0, "the moment of failure is in view"
+        assert choices.top > 0, "the moment of failure is in view"
         await settle(pilot, "n", "slash", *"arming")
         assert "arming" in items(app).casefold()
         await settle(pilot, "escape", "escape", "p")
@@ -230,8 +231,8 @@ async def test_one_key_leads_from_any_view_to_any_other_and_digits_leave_it() ->
         for key, name in (("m", "Messages"), ("p", "plots"), ("y", "History"), ("w", "Graph"), ("v", "Contents")):
             await settle(pilot, key, key)
             assert walk(app).here == name.lower()
-            assert walk(app).query_one("#view-tabs", Tabs).active == name.lower()
-            assert not walk(app).query_one("#step-tabs", Tabs).active
+            assert walk(app).query_one("#view-tabs", TabRow).here == name.lower()
+            assert not walk(app).query_one("#step-tabs", TabRow).here
         await settle(pilot, "escape", "escape")
         assert walk(app).here == "history", "Esc leads back the way the operator came"
         for digit, name in (("3", "Causes"), ("5", "Diff")):

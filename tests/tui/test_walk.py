@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from textual.dom import DOMNode
-from textual.widget import Widget
-from textual.widgets import Tabs
+from textual.pilot import Pilot
+from textual.widgets import Static
 
 from care_core.diagnose.records import Circumstance, Diagnosis, Fault
 from care_core.errors import ExitCode
@@ -27,7 +27,9 @@ from care_tui.settings import Settings
 from care_tui.widgets.answer_bar import AnswerBar
 from care_tui.widgets.choices import Choices
 from care_tui.widgets.filter_bar import FilterBar
+from care_tui.widgets.keys import Keys
 from care_tui.widgets.reader import Reader
+from care_tui.widgets.tab_row import TabRow
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
 
@@ -67,8 +69,7 @@ def answer(app: CareApp) -> str:
 
 def hints(app: CareApp) -> str:
     """The keys in the last line, and what was said in passing."""
-    keys = [f"{key.key_display} {key.description}" for key in app.screen.query("FooterKey") if key.display]  # type: ignore[attr-defined]
-    return "\n".join([" ".join(keys), app.title])
+    return "\n".join([str(app.screen.query_one(Keys).content), app.title])
 
 
 def shown(app: CareApp) -> str:
@@ -106,7 +107,7 @@ async def test_digits_and_sideways_keys_move_between_steps(make_app: MakeApp) ->
         for number in range(1, 7):
             await settle(pilot, str(number))
             assert step_of(app) == number
-            assert walk(app).query_one("#step-tabs", Tabs).active == NAMES[number - 1]
+            assert walk(app).query_one("#step-tabs", TabRow).here == NAMES[number - 1]
 
 
 async def test_the_objectives_tell_all_three_states_and_where_the_run_came_from(make_app: MakeApp) -> None:
@@ -146,10 +147,10 @@ async def test_o_shows_the_causes_of_the_next_fault(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3", "o")
-        assert walk(app).page.choices.option_count == 1
+        assert walk(app).page.choices.shown_count == 1
         assert "Causes of energy (2 of 2 faults" in title(app)
         await settle(pilot, "o")
-        assert walk(app).page.choices.option_count == 3
+        assert walk(app).page.choices.shown_count == 3
 
 
 async def test_a_cause_set_aside_leaves_the_fix_and_its_reason_is_in_the_report(make_app: MakeApp) -> None:
@@ -253,12 +254,12 @@ async def test_slash_filters_and_escape_clears(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4", "slash", *"wpn")
-        assert walk(app).page.choices.option_count == 1
+        assert walk(app).page.choices.shown_count == 1
         assert "WPNAV_SPEED" in text(app), "the text follows what is left"
         await settle(pilot, "enter", "space")
         assert "WPNAV_SPEED" in walk(app).session.basket.ticked, "keys work on what is left"
         await settle(pilot, "escape")
-        assert walk(app).page.choices.option_count == 3
+        assert walk(app).page.choices.shown_count == 3
         assert step_of(app) == 4
         await settle(pilot, "5", "slash", *"suggested")
         assert text(app) == "+++ suggested"
@@ -390,9 +391,9 @@ async def test_tab_moves_between_panes(make_app: MakeApp) -> None:
         assert app.focused is not None
         assert app.focused.id == "text"
         await settle(pilot, "G")
-        assert walk(app).page.reader.scroll_y > 0
+        assert walk(app).page.reader.top > 0
         await settle(pilot, "g", "j", "k", "pagedown", "pageup")
-        assert walk(app).page.reader.scroll_y == 0
+        assert walk(app).page.reader.top == 0
         await settle(pilot, "tab")
         assert app.focused.id == "list"
 
@@ -401,7 +402,7 @@ async def test_the_mouse_opens_steps_and_items(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await pilot.click("#causes")
+        await click_on(pilot, "#step-tabs", "Causes")
         await settle(pilot)
         assert step_of(app) == 3
         await pilot.click(walk(app).page.choices, offset=(5, 2))
@@ -417,18 +418,19 @@ async def test_a_click_on_a_key_of_the_last_line_is_that_key(make_app: MakeApp) 
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
         for says, at in (("Fix", "fix"), ("Diff", "diff")):
-            await pilot.click(key_that(app, says))
+            await click_on(pilot, "Keys", says)
             await settle(pilot)
             assert walk(app).here == at
         await settle(pilot, "3")
-        await pilot.click(key_that(app, "Set aside"))
+        await click_on(pilot, "Keys", "Set aside")
         await settle(pilot)
         assert isinstance(app.screen, Prompt)
 
 
-def key_that(app: CareApp, says: str) -> Widget:
-    """The key in the last line that does this."""
-    return next(key for key in app.screen.query("FooterKey") if key.description == says)  # type: ignore[attr-defined]
+async def click_on(pilot: Pilot[int], line: str, words: str) -> None:
+    """Click where a line of the screen says this."""
+    shown = str(pilot.app.screen.query_one(line, Static).content)
+    await pilot.click(line, offset=(shown.index(words), 0))
 
 
 @pytest.mark.parametrize(
