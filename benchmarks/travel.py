@@ -54,12 +54,22 @@ APART = {
         "path_length", "legs", "hold_time", "commanded_speed", "takeoff_height", "return_distance", "hover_power",
     ),
     "ardurover": ("path_length", "legs", "hold_time", "commanded_speed", "sharp_turns", "steering_kind"),
+    "arduplane": ("path_length", "legs", "hold_time", "loiter_turns", "rises", "sharpest_corner", "level_power"),
+    "quadplane": ("path_length", "legs", "hold_time", "loiter_turns", "rises", "sharpest_corner", "returns"),
+    "ardusub": ("path_length", "legs", "hold_time", "climb", "descent", "corner_turn"),
 }  # fmt: skip
 """Contexts by which the distance of a mission from those of training is told, each in standard deviations."""
-FAULTS = {"arducopter": "varied", "ardurover": "rover"}
+FAULTS = {
+    "arducopter": "varied", "ardurover": "rover", "arduplane": "plane", "quadplane": "quadplane", "ardusub": "sub",
+}  # fmt: skip
 """Folder of each platform's failed runs of settings that training never saw."""
 FAR = (0.5, 1.0)
 """Distances that part near, farther and far missions."""
+
+
+def measured(schema: Schema) -> tuple[str, ...]:
+    """The objectives that are predicted as numbers; a simulated QuadPlane's battery measures no energy."""
+    return tuple(name for name in MEASURED if name in schema.variables)
 
 
 class LeftOut(Struct, eq=False):
@@ -89,7 +99,7 @@ def left_out(frame: pd.DataFrame, schema: Schema, folds: int) -> LeftOut:
         return np.concatenate(of)[order]
 
     def by_name(of: Sequence[Mapping[str, FloatArray]]) -> dict[str, FloatArray]:
-        return {name: joined([one[name] for one in of]) for name in MEASURED}
+        return {name: joined([one[name] for one in of]) for name in measured(schema)}
 
     return LeftOut(
         joined([p.distance for p in parts]), by_name([p.error for p in parts]), by_name([p.inside for p in parts]),
@@ -113,7 +123,7 @@ def _predict(frame: pd.DataFrame, schema: Schema, test: NDArray[np.bool_]) -> Le
         medians = {v.name: train[v.name].median() for v in schema.contexts}
         inputs = [v.name for v in (*schema.options, *schema.contexts)]
         peer = PlainClassifier(train.fillna(medians), all_met(train, schema) == 1.0, inputs)
-        flown = {name: needs(schema.variables[name], frame, schema)[test] for name in MEASURED}
+        flown = {name: needs(schema.variables[name], frame, schema)[test] for name in measured(schema)}
         return _asked(
             model, schema, rows, rows.fillna(medians), flown, peer, _distance(train, rows, APART[schema.name])
         )
@@ -124,7 +134,7 @@ def _asked(
     peer: PlainClassifier, distance: FloatArray,
 ) -> LeftOut:  # fmt: skip
     n = len(rows)
-    error, inside, need_error, need_inside = ({name: np.full(n, np.nan) for name in MEASURED} for _ in range(4))
+    error, inside, need_error, need_inside = ({name: np.full(n, np.nan) for name in measured(schema)} for _ in range(4))
     found = LeftOut(distance, error, inside, need_error, need_inside, np.full(n, np.nan), np.full(n, np.nan))
     reference = {v.name: v.default for v in schema.options if v.default is not None}
     configs = [{str(k): float(v) for k, v in row.items()} for row in filled.to_dict("records")]
@@ -139,7 +149,7 @@ def _asked(
                 need = float(before.predict(objective.name, [there]).value[0])
                 bounds[objective.name] = objective.relative.for_need(need)
         found.predicted[i] = CounterfactualQuery(model, config, {}, bounds).probability([config])[0]
-        for name in MEASURED:
+        for name in measured(schema):
             value = rows[name].iloc[i]
             if not value > 0:
                 continue
@@ -172,7 +182,7 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
         if part.sum() < 20:
             continue
         cells = []
-        for name in MEASURED:
+        for name in measured(schema):
             known = part & np.isfinite(found.error[name])
             cells.append(
                 f"{np.sqrt(np.mean(found.error[name][known] ** 2)):9.1%} {found.inside[name][known].mean():8.0%}"
@@ -181,7 +191,7 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
             brier = float(((predicted[part] - truth[part]) ** 2).mean())
             cells.append(f"{calibration_error(predicted[part], truth[part]):9.3f} {brier:7.3f}")
         print(f"  {low:4.1f} to {high:4.1f} ({part.sum():4d})    {'    '.join(cells)}")
-    for name in MEASURED:
+    for name in measured(schema):
         known = np.isfinite(found.need_error[name])
         error = found.need_error[name][known]
         print(f"  what the reference needs, {name}: rms {np.sqrt(np.mean(error**2)):.1%}, "

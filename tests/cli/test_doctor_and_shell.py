@@ -69,18 +69,18 @@ def test_a_shell_gets_its_script(care: Care, shell: str) -> None:
     [
         ("care wat", {"watch"}),
         ("care watch --not", {"--notify-command"}),
-        ("care triage --profile ardu", {"arducopter", "ardurover"}),
+        ("care triage --profile ardu", {"arducopter", "arduplane", "ardurover", "ardusub"}),
         ("care profiles sh", {"show"}),
         ("care profiles show husk", {"husky", "husky-care"}),
         ("care graph tur", {"turtlebot3"}),
         ("care triage a", set()),  # the shell names files itself
-        ("care triage a.BIN --keep LAND_", {"LAND_SPEED"}),
-        ("care triage a.mcap --keep LAND_", set()),  # no profile of such logs has it
+        ("care triage a.BIN --keep LAND_S", {"LAND_SPEED"}),
+        ("care triage a.mcap --keep LAND_S", set()),  # no profile of such logs has it
         ("care triage --profile owlat --keep dig_s", {"dig_speed"}),
-        ("care whatif a.BIN --set LAND_", {"LAND_SPEED="}),
+        ("care whatif a.BIN --set LAND_S", {"LAND_SPEED="}),
         ("care triage a.BIN --threshold mission_t", {"mission_time="}),
         ("care verify report.yaml a.BIN --threshold en", {"energy="}),
-        ("care a.BIN --keep LAND_", {"LAND_SPEED"}),
+        ("care a.BIN --keep LAND_S", {"LAND_SPEED"}),
         ("care triage --profile nosuch --keep ", set()),
         ("care triage a.BIN --mission ", set()),
         ("care nonsense --ke", set()),
@@ -101,7 +101,7 @@ def test_completing_reads_no_yaml_of_a_profile_that_was_read_before() -> None:
     """Reading it takes as long as all the rest of what a shell waits for."""
     read_profiles = "from care_core.extract.select import sound_profiles; sound_profiles()"
     subprocess.run([sys.executable, "-c", read_profiles], env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True)
-    assert completed("care triage a.BIN --keep LAND_", "ruamel") == "LAND_SPEED\n"
+    assert completed("care triage a.BIN --keep LAND_S", "ruamel") == "LAND_SPEED\n"
 
 
 def completed(words: str, *unread: str) -> str:

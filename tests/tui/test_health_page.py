@@ -77,7 +77,7 @@ async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_
         assert "What would make one fit\n- for arducopter: record CMD\n" in text(app)
         for step in "2345":
             await settle(pilot, step)
-            assert text(app).startswith("No profile fits this log, so ")
+            assert text(app).startswith("No profile fits this log (it is a rover, the profile is of a copter), so ")
             assert items(app) == ""
             await settle(pilot, "a", "d", "space", "equals_sign", "plus", "u", "f", "c", "o")
             assert step_of(app) == int(step)
@@ -98,7 +98,9 @@ async def test_what_a_run_without_a_profile_did_is_judged_and_one_without_a_miss
         assert step_of(app) == 2
         assert items(app).startswith("✓ OK")
         await settle(pilot, "v", "escape", "4")
-        assert text(app).startswith("No profile fits this log, so no change")
+        assert text(app).startswith(
+            "No profile fits this log (it is a rover, the profile is of a copter), so no change"
+        )
     plain = replace(sample.all_ok(), run=replace(sample.RUN, checks=(Check("no_crash", 1.0, ""),)))
     app = make_app(plain)
     async with app.run_test(size=(80, 24)) as pilot:

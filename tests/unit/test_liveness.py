@@ -60,6 +60,7 @@ def frozen(findings: tuple[Finding, ...]) -> list[Finding]:
         ("ATT", "the attitude is frozen", "estimator"),
         ("POS", "the estimated position is frozen", "estimator"),
         ("BAT", "the battery's monitor is frozen", "battery"),
+        ("ARSP", "the airspeed sensor is frozen", "airspeed"),
         ("RCOU", "the record of the motor outputs is frozen", "motor"),
     ],
 )

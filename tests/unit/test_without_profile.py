@@ -264,8 +264,8 @@ def test_what_a_run_came_to() -> None:
 
 
 def test_a_failed_run_of_a_stranger_is_a_fault_without_causes_by_parameters(tmp_path: Path) -> None:
-    path = write_text(tmp_path / "sub.log", SAMPLES / "arducopter_failed.BIN")
-    path.write_text(path.read_text().replace("ArduCopter V", "ArduSub V"))
+    path = write_text(tmp_path / "blimp.log", SAMPLES / "arducopter_failed.BIN")
+    path.write_text(path.read_text().replace("ArduCopter V", "Blimp V"))
     diagnosis = open_case(Request(path), lambda _step, _share: None).diagnosis
     assert diagnosis.profile.fit.verdict == "no"
     assert {one.name for one in diagnosis.objectives} >= {"armed", "no_crash", "no_failsafe"}

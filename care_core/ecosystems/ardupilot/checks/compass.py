@@ -57,6 +57,9 @@ _CALIBRATION = calibrated(
     ((1.0, 0.8), (1.5, 0.95), (3.0, 0.98)),
     "all training flights over the limit have a failing compass, and no other",
 )
+_LOST_ON_WINGS = LIMITS.add(
+    "probability that it costs a plane its mission", 0.2, "", "1 of 4 training flights: a plane steers by its course"
+)
 _LOST = LIMITS.add(
     "probability that it costs the mission", 0.65, "",
     "6 of 8 such training flights failed, of those without a failed part 48 % (a critical finding counts as four)",
@@ -169,7 +172,7 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             ),
             source="MAG, MAG2; AP_COMPASS_MAX_XY_LENGTH_DIFF 200 mGauss",
             probability=calibrated_probability(ratio, _CALIBRATION),
-            mission_lost=_LOST,
+            mission_lost=_LOST_ON_WINGS if flight.kind == "plane" else _LOST,
         )
 
 

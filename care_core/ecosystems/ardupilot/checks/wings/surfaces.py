@@ -39,7 +39,9 @@ _STOP = LIMITS.add("surface at its stop", 0.85, "", "a choice, as a share of its
 _STOP_S = LIMITS.add("shortest time at the stop", 5.0, "s", "a choice: a turn is over sooner")
 _LACKS_DPS = LIMITS.add("rate that is lacking at the stop", 4.0, "deg/s", "a choice: three times the noise of a rate")
 _ONE_SIDE = LIMITS.add("mean of a surface over its size", 0.6, "", "a choice: what swings goes both ways")
-_WRONG_WAY = LIMITS.add("probability of a surface that turns it the wrong way", 0.9, "", "simulated flights, see below")
+_WRONG_WAY = LIMITS.add(
+    "probability of a surface that turns it the wrong way", 0.9, "", "all 6 of 313 simulated flights that are turned so"
+)
 _STUCK = LIMITS.add("probability of one at its stop", 0.4, "", "a choice: a gain or a trim may hold it there, too")
 _FULL = 4500.0
 """AETR of a surface out to its stop (SRV_Channel.h)."""
