@@ -18,6 +18,7 @@ import json
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -72,8 +73,9 @@ def measured(schema: Schema) -> tuple[str, ...]:
     return tuple(name for name in MEASURED if name in schema.variables)
 
 
-class LeftOut(Struct, eq=False):
-    """Predictions of runs whose missions the model never saw, each of shape (n,)."""
+class LeftOut(NamedTuple):
+    """Predictions of runs whose missions the model never saw, each of shape (n,). A tuple: worker processes know the
+    classes of a module that is run as a program by their fields alone."""
 
     distance: FloatArray
     error: dict[str, FloatArray]
@@ -102,10 +104,14 @@ def left_out(frame: pd.DataFrame, schema: Schema, folds: int) -> LeftOut:
         return {name: joined([one[name] for one in of]) for name in measured(schema)}
 
     return LeftOut(
-        joined([p.distance for p in parts]), by_name([p.error for p in parts]), by_name([p.inside for p in parts]),
-        by_name([p.need_error for p in parts]), by_name([p.need_inside for p in parts]),
-        joined([p.predicted for p in parts]), joined([p.plain for p in parts]),
-    )  # fmt: skip
+        distance=joined([p.distance for p in parts]),
+        error=by_name([p.error for p in parts]),
+        inside=by_name([p.inside for p in parts]),
+        need_error=by_name([p.need_error for p in parts]),
+        need_inside=by_name([p.need_inside for p in parts]),
+        predicted=joined([p.predicted for p in parts]),
+        plain=joined([p.plain for p in parts]),
+    )
 
 
 def _predict(frame: pd.DataFrame, schema: Schema, test: NDArray[np.bool_]) -> LeftOut:
@@ -135,10 +141,18 @@ def _asked(
 ) -> LeftOut:  # fmt: skip
     n = len(rows)
     error, inside, need_error, need_inside = ({name: np.full(n, np.nan) for name in measured(schema)} for _ in range(4))
-    found = LeftOut(distance, error, inside, need_error, need_inside, np.full(n, np.nan), np.full(n, np.nan))
+    found = LeftOut(
+        distance=distance,
+        error=error,
+        inside=inside,
+        need_error=need_error,
+        need_inside=need_inside,
+        predicted=np.full(n, np.nan),
+        plain=np.full(n, np.nan),
+    )
     reference = {v.name: v.default for v in schema.options if v.default is not None}
     configs = [{str(k): float(v) for k, v in row.items()} for row in filled.to_dict("records")]
-    found.plain = peer.probability(configs)
+    found.plain[:] = peer.probability(configs)
     for i, config in enumerate(configs):
         there = {**config, **reference}
         before = CounterfactualQuery(model, config, {}, {})

@@ -71,8 +71,8 @@ def _given_up(flight: Flight, sensor: Table, moved: Table) -> Iterator[Finding]:
         end_s=end,
         severity="warning",
         evidence=(
-            f"the firmware took it out of use at {log_time(start, 0)}, where it read {float(np.interp(start, t, read)):.1f} "
-            f"m/s at {ground:.0f} m/s over ground"
+            f"the firmware took it out of use at {log_time(start, 0)}, where it read "
+            f"{float(np.interp(start, t, read)):.1f} m/s at {ground:.0f} m/s over ground"
         ),
         source="ARSP.Airspeed, U, H against GPS.Spd",
         probability=_FAILED,
