@@ -117,6 +117,17 @@ def test_a_stall() -> None:
     assert "AIRSPEED_MIN 12" in finding.evidence
 
 
+@pytest.mark.parametrize(("done_s", "is_slow"), [(35.0, False), (48.0, True), (None, True)])
+def test_a_transition_of_a_quadplane(done_s: float | None, is_slow: bool) -> None:
+    flown = MadePlane()
+    flown.settings |= {"Q_ENABLE": 1, "Q_TRANSITION_MS": 5000}
+    flown.rows["MSG"].append((25.0, {"Message": "Transition started airspeed 0.9"}))
+    if done_s is not None:
+        flown.rows["MSG"].append((done_s, {"Message": "Transition done"}))
+    told = [one.title for one in every_finding(flown.find()) if one.kind == "thrust"]
+    assert told == ["the transition to the wings takes too long"] * is_slow
+
+
 def test_a_record_that_lost_its_attitude_for_a_while_is_read() -> None:
     """A plane of which an attitude stands still for a while was once read with arrays of two lengths."""
     flown = MadePlane()

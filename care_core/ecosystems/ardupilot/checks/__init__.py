@@ -39,7 +39,7 @@ from care_core.ecosystems.ardupilot.checks.settings import (
     supply,
     thrust_curve,
 )
-from care_core.ecosystems.ardupilot.checks.wings import airspeed, propeller, surfaces
+from care_core.ecosystems.ardupilot.checks.wings import airspeed, propeller, surfaces, transition
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -55,6 +55,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     airspeed.CHECK,
     propeller.CHECK,
     surfaces.CHECK,
+    transition.CHECK,
     attitude.CHECK,
     barometer.CHECK,
     battery.CHECK,
