@@ -12,7 +12,7 @@ from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.ardupilot.spans import runs
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import Finding, every_finding
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
 from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made, flight_of
@@ -851,3 +851,25 @@ def test_what_lies_on_its_back_is_told(firmware: str, mode: float, since_s: floa
     made.rows["MODE"] = [(0.0, {"ModeNum": mode})]
     made.table["ATT"]["Roll"][made.after(since_s)] = 175.0
     assert [one.title for one in made.find() if one.kind == "attitude"] == ([title] if title else [])
+
+
+@pytest.mark.parametrize(("output", "named"), [("ROut", "roll"), ("YOut", "heading")])
+def test_a_submarine_that_fights_to_hold_still_lacks_a_thruster(output: str, named: str) -> None:
+    dive = Made()
+    dive.facts = {"firmware": "ArduSub V4.5.0"}
+    dive.rows["MODE"] = [(0.0, {"ModeNum": 2.0})]
+    dive.table["RATE"] = {"ROut": dive.noise(0.02), "YOut": dive.noise(0.02)}
+    dive.table["ATT"]["DesYaw"][:] = 90.0
+    assert not [one for one in every_finding(dive.find()) if "thruster" in one.title]
+    dive.table["RATE"][output][dive.after(40.0, 80.0)] = 0.5
+    (found,) = [one for one in every_finding(dive.find()) if "thruster" in one.title]
+    assert found.title == f"a thruster is weak, off or reversed: it fights to hold its {named}"
+    assert found.kind == "motor"
+
+
+def test_a_submarine_that_leaks() -> None:
+    dive = Made()
+    dive.facts = {"firmware": "ArduSub V4.5.0"}
+    dive.rows["ERR"] = [(60.0, {"Subsys": 27.0, "ECode": 1.0})]
+    (found,) = [one for one in every_finding(dive.find()) if one.kind == "leak"]
+    assert (found.onset_s, found.severity) == (60.0, "critical")

@@ -26,6 +26,7 @@ from care_core.ecosystems.ardupilot.checks import (
     spectrum,
     takeoff,
     thrust,
+    thruster,
     vibration,
     way_home,
 )
@@ -79,6 +80,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     spectrum.CHECK,
     takeoff.CHECK,
     thrust.CHECK,
+    thruster.CHECK,
     vibration.CHECK,
     way_home.CHECK,
 )

@@ -1,0 +1,70 @@
+"""A thruster of a submarine that is weak, off or reversed, by what its vehicle needs to hold still.
+
+Thrusters are laid out in pairs, so a sound submarine holds its roll and heading with hardly any output of its rate
+controllers; one that lacks a thruster turns with every push of its partner, and has to hold against that all the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import lasting, smooth
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+from care_core.numbers import median
+
+READS: Wanted = {"RATE": ("ROut", "YOut"), "ATT": ("DesRoll", "DesYaw")}
+
+LIMITS = Limits()
+_MEASURED = (
+    "simulated dives with sound thrusters: 0.04 at most on either; one that failed: roll 0.48, heading 0.05 to 0.6"
+)
+_ROLL = LIMITS.add("output that holds the roll", 0.25, "", _MEASURED)
+_HEADING = LIMITS.add("output that holds the heading", 0.07, "", _MEASURED)
+_STILL_DPS = LIMITS.add("rate that is asked for while it holds still", 6.0, "deg/s", "a choice: turns take output")
+_OVER_S = LIMITS.add("time over which the output is averaged", 5.0, "s", "a choice: waves and gains swing to and fro")
+_LASTS_S = LIMITS.add("shortest time of holding", 8.0, "s", "a choice: a current pushes for a while")
+_FAILED = LIMITS.add("probability of a thruster", 0.75, "", "a choice: an uneven load or a tether pulls as well")
+_LOST = LIMITS.add("probability that it costs the mission", 0.5, "", "5 of 11 such dives")
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The axis that needs the most; a thruster that lifts shows in the roll, one that pushes in the heading."""
+    table, asked = flight.one("RATE", "ROut", "YOut"), flight.one("ATT", "DesRoll", "DesYaw")
+    if flight.kind != "sub" or table is None or asked is None or len(asked) < 3:
+        return
+    t = table.t
+    found = []
+    for axis, named, limit in (("Roll", "roll", _ROLL), ("Yaw", "heading", _HEADING)):
+        held = smooth(t, table[f"{axis[0]}Out"], _OVER_S)
+        turns = np.gradient(np.degrees(np.unwrap(np.radians(asked[f"Des{axis}"]))), asked.t)
+        still = np.interp(t, asked.t, np.abs(smooth(asked.t, turns, _OVER_S))) < _STILL_DPS
+        spans = lasting(t, (np.abs(held) > limit) & still & during(flight.watched, t), _LASTS_S, gap_s=4.0)
+        if spans:
+            took = float(median(np.abs(held)[during(spans, t)]))
+            found.append((took / limit, named, took, limit, spans))
+    if not found:
+        return
+    _, named, took, limit, spans = max(found)
+    yield Finding(
+        kind="motor",
+        title=f"a thruster is weak, off or reversed: it fights to hold its {named}",
+        onset_s=spans[0][0],
+        end_s=spans[-1][1],
+        severity="warning",
+        evidence=(
+            f"{100 * took:.0f} % of its control of the {named} for {sum(b - a for a, b in spans):.0f} s, with no turn "
+            f"asked for (limit {100 * limit:.0f} %)"
+        ),
+        source="RATE.ROut, YOut; ATT.DesRoll, DesYaw",
+        probability=_FAILED,
+        mission_lost=_LOST,
+    )
+
+
+CHECK = Check("thruster", "a thruster of a submarine that is weak, off or reversed", READS, LIMITS, find)
