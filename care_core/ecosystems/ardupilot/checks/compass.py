@@ -193,7 +193,9 @@ def _odd_one(compasses: list[Table], other: int) -> int:
 
 
 def _severity(flight: Flight, start: float, is_used: bool) -> Severity:
-    """Critical where the compass in use is the bad one and the estimator's yaw suffered."""
+    """Critical where the compass in use is the bad one and the estimator's yaw suffered; a plane steers by course."""
+    if flight.kind == "plane" and not flight.was_refused:
+        return "warning"
     return "critical" if is_used and (_rejected(flight, start) or flight.was_refused) else "warning"
 
 
