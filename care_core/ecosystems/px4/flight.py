@@ -43,6 +43,8 @@ ROTARY, ROVER = 1, 3
 TERMINATION = 13
 """nav_state in which the failure detector has ended the flight (vehicle_status.msg)."""
 AIRBORNE_M = 2.0
+BARELY_M = 0.5
+"""Rise below which a vehicle never left the ground."""
 """Height above where it was armed from which it flew."""
 SAID_WITHIN_S = 1.0
 """Topics are published at their own times: what belongs to an event may come so much after it."""

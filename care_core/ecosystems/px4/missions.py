@@ -14,6 +14,7 @@ from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.checks.kill_switch import killed_aloft_s
 from care_core.ecosystems.px4.flight import (
     AIRBORNE_M,
+    BARELY_M,
     FLAGS,
     LANDED,
     MESSAGES,
@@ -35,8 +36,6 @@ from care_core.text import log_time
 
 _SOON_S = 1.0
 """What falls is disarmed as it hits the ground."""
-_BARELY_M = 0.5
-"""Rise below which a vehicle never left the ground."""
 _HOVERS_S = 5.0
 """A throttle-up on a bench is over sooner."""
 _CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
@@ -140,9 +139,9 @@ def _took_off(flight: Px4Flight, span: Span) -> Value:
     heights = flight.heights(span)
     if heights is not None:
         rise_m = float(heights["height"].max())
-        if rise_m > _BARELY_M and _off_the_ground_s(flight, span) > _HOVERS_S:
+        if rise_m > BARELY_M and _off_the_ground_s(flight, span) > _HOVERS_S:
             return 1.0
-        barely = f"it rose no higher than {rise_m:.1f} m" if rise_m > _BARELY_M else "it never left the ground"
+        barely = f"it rose no higher than {rise_m:.1f} m" if rise_m > BARELY_M else "it never left the ground"
         return 1.0 if rise_m > AIRBORNE_M else Unavailable(barely)
     if flight.during(LANDED, "landed", span) is None:
         return Unavailable("the log does not say when it was on the ground", f"record {LANDED}", LANDED)

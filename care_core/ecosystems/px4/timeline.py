@@ -12,6 +12,7 @@ from care_core.ecosystems.findings import Event
 from care_core.ecosystems.px4.checks import estimator, flags
 from care_core.ecosystems.px4.flight import (
     AIRBORNE_M,
+    BARELY_M,
     LANDED,
     MESSAGES,
     POSITION,
@@ -37,6 +38,8 @@ READS: Wanted = {
 }
 
 _SAGS = 0.9
+_SOON_S = 1.0
+"""The land detector speaks so shortly after a disarming."""
 _3D = 3
 _FIXES = {0: "no fix", 1: "no fix", 2: "2D fix", 3: "3D fix", 4: "3D fix, DGPS", 5: "3D fix, RTK float",
           6: "3D fix, RTK fixed", 8: "extrapolated"}  # fmt: skip
@@ -102,11 +105,24 @@ def _uploads(flight: Px4Flight) -> Iterator[Event]:
         yield Event(t, "mission", f"another mission was uploaded{when}{size}", RESULT)
 
 
+def _rose(flight: Px4Flight, t: float) -> bool:
+    """Whether it rose while it was armed at this time, as far as the log tells its height."""
+    span = next((span for span in flight.armed if span[0] <= t <= span[1] + _SOON_S), None)
+    heights = None if span is None else flight.heights(span)
+    return heights is None or float(heights["height"].max()) > BARELY_M
+
+
 def _landings(flight: Px4Flight) -> Iterator[Event]:
-    """Taking off and landing by the land detector, and the highest point between."""
+    """Taking off and landing by the land detector, and the highest point between. What it says of a vehicle that never
+    rose is no flight: it speaks up on a bench as well."""
     for at, (t, landed) in enumerate(flight.changes(LANDED, "landed")):
         if at or not landed:
-            yield Event(t, "flight", "landed" if landed else "took off", LANDED)
+            said = (
+                ("landed", "took off")
+                if _rose(flight, t)
+                else ("the land detector sees the ground again", "the land detector sees no ground")
+            )
+            yield Event(t, "flight", said[not landed], LANDED)
     for span in flight.armed:
         heights = flight.heights(span)
         top = 0 if heights is None else int(np.argmax(heights["height"]))
