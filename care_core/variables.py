@@ -165,6 +165,9 @@ class Variable(Record):
     safety: bool = False
     ceiling: bool = False
     """How fast the robot may go at most: less than the reference's is no fault but what this robot can or is to do."""
+    airframe: bool = False
+    """Whether it is chosen for the airframe, as a plane's gains and speeds are: then a firmware's default that is not
+    the profile's own is no reference for it, and a vehicle is judged with its own value."""
     kind: Kind | None = None
     threshold: Threshold | None = None
     grows: bool = False

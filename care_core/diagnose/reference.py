@@ -9,7 +9,7 @@ faster.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
 
 from care_core.causal.counterfactual import Config
 from care_core.causal.model import Model
@@ -64,6 +64,7 @@ def reference_of(run: Run, schema: Schema, model: Model, good: Good | None = Non
         # A value that may not be suggested is no reference, but where it is driven it is none to be off either.
         if schema.variables[name].accepts(value) or (name in named and _is_same(value, run.config.get(name))):
             config[name] = value
+    config.update(dict(_of_the_airframe(run, schema, recorded, named)))
     lower = {name: own for name, own in _ceilings(run, schema) if name not in named and own < config.get(name, own)}
     config.update(lower)
     config.update({name: value for name, value in run.context.items() if is_known(value)})
@@ -96,6 +97,19 @@ def _may_be_a_release(recorded: float, firmware: float) -> bool:
     if firmware == 0 or recorded == 0:
         return recorded == firmware
     return 1 / _RELEASES_DIFFER <= recorded / firmware <= _RELEASES_DIFFER
+
+
+def _of_the_airframe(
+    run: Run, schema: Schema, recorded: Mapping[str, float], named: Container[str]
+) -> Iterator[tuple[str, float]]:
+    """The run's own values of options that are chosen for an airframe, where nobody names others and the defaults in
+    the log are those of a firmware that knows no airframe."""
+    for option in schema.options:
+        own, default = run.config.get(option.name), option.default
+        if not option.airframe or own is None or default is None or option.name in named:
+            continue
+        if option.name in recorded and not same_value(recorded[option.name], default):
+            yield option.name, own
 
 
 def _ceilings(run: Run, schema: Schema) -> Iterator[tuple[str, float]]:

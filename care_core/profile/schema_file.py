@@ -94,6 +94,7 @@ class _Variable(Strict):
     phase: str = ""
     safety: bool = False
     ceiling: bool = False
+    airframe: bool = False
     kind: Kind | None = None
     threshold: Bound | None = None
     grows: bool = False
@@ -141,8 +142,8 @@ class _Variable(Strict):
             raise ValueError("only options have a 'parameter'")
         if self.role is not Role.OPTION and (self.modes or self.phase):
             raise ValueError("only options have 'modes' and a 'phase', those that read it")
-        if self.role is not Role.OPTION and self.ceiling:
-            raise ValueError("only options are a 'ceiling'")
+        if self.role is not Role.OPTION and (self.ceiling or self.airframe):
+            raise ValueError("only options are a 'ceiling', or of an 'airframe'")
         if self.safety and self.default is None:
             raise ValueError("a 'safety' option needs 'default', the value past which it is never moved")
         if self.range is not None and self.range[0] >= self.range[1]:
@@ -380,6 +381,7 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         phase=v.phase,
         safety=v.safety,
         ceiling=v.ceiling,
+        airframe=v.airframe,
         kind=v.kind,
         threshold=None if v.threshold is None else v.threshold.threshold(),
         grows=v.grows,

@@ -73,10 +73,7 @@ def _entry(variable: Variable) -> Iterator[tuple[str, Any]]:
         yield "doc", variable.doc
     if variable.parameters:
         yield "parameter", variable.parameters[0] if len(variable.parameters) == 1 else list(variable.parameters)
-    if variable.safety:
-        yield "safety", True
-    if variable.ceiling:
-        yield "ceiling", True
+    yield from ((name, True) for name in ("safety", "ceiling", "airframe") if getattr(variable, name))
     if variable.threshold is not None:
         yield "threshold", _bound(variable.threshold)
     if variable.extract is not None:
