@@ -154,8 +154,8 @@ def beyond_training(run: Run, schema: Schema, model: Model) -> str:
     empty where it is like them."""
     for variable in schema.contexts:
         value, summary = run.context.get(variable.name), model.summaries.get(variable.name)
-        if variable.about != "mission" or variable.unit != "m" or summary is None or not is_known(value):
-            continue
+        if variable.about != "mission" or variable.unit != "m" or summary is None or not is_known(value) or value == 0:
+            continue  # a mission that asks for none of it, no climb or no way back, is no other for that
         if not _times(summary.low, least=True) <= value <= _times(summary.high, least=False):
             seen = f"{figures(summary.low)} to {figures(summary.high)}"
             return f"{variable.doc or variable.name} {figures(value)} {variable.unit}".rstrip() + f", {seen} there"
