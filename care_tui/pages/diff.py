@@ -19,7 +19,7 @@ from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to, sentence
 from care_tui.places import as_path
 from care_tui.render.fix import no_fix_rows
-from care_tui.render.rows import Rows, command_rows, diff_rows, error_rows, percent
+from care_tui.render.rows import Rows, command_rows, diff_rows, error_rows, percent, warning
 from care_tui.screens.confirm import Confirm
 from care_tui.screens.prompt import Prompt
 
@@ -62,7 +62,14 @@ class DiffPage(DiagnosisPage):
             return
         engine, decided = self.workspace.engine, self.session.decided()
         commands = engine.commands if side == "driven" else lambda _diagnosis: []
-        self.fetched(DIFF, lambda: (engine.diff(case, fix, side), commands(decided)))
+        self.fetched(
+            DIFF,
+            lambda: (
+                engine.diff(case, fix, side),
+                commands(decided),
+                engine.doubts(case, fix) if side == "file" else (),
+            ),
+        )
 
     def view_of_diagnosis(self) -> View:
         session, answer = self.session, self._answers.get(DIFF)
@@ -70,8 +77,10 @@ class DiffPage(DiagnosisPage):
         if isinstance(answer, CareError):
             return View(title, lambda _: error_rows(answer))
         if isinstance(answer, tuple):
-            diff, commands = answer
-            return View(title, lambda _: Rows([*diff_rows(diff or "No difference.\n").rows, *command_rows(commands)]))
+            diff, commands, doubts = answer
+            notes = [warning("File", clean(doubt)) for doubt in doubts]
+            lines = diff_rows(diff or "No difference.\n").rows
+            return View(title, lambda _: Rows([*notes, *lines, *command_rows(commands)]))
         if session.only_asked:
             return View(Content("Nothing is advised"), lambda _: sentence(session.only_asked))
         if session.basket.ticked and session.fix_error is not None:

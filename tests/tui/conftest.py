@@ -79,9 +79,19 @@ def fake_commands(diagnosis: Diagnosis) -> list[str]:
     return [f"param set {change.option.name} {change.suggested:g}" for change in changes]
 
 
+DOUBT = "12 parameters of the file are not what the robot ran"
+"""What speaks against the file that a test names."""
+
+
 def fake_engine(diagnose: Callable[..., Case]) -> Engine:
     return Engine(
-        diagnose, fake_predict, fake_diff, fake_report, fake_commands, remember=lambda _diagnosis, _request: None
+        diagnose,
+        fake_predict,
+        fake_diff,
+        fake_report,
+        fake_commands,
+        doubts=lambda _case, _fix: (DOUBT,),
+        remember=lambda _diagnosis, _request: None,
     )
 
 

@@ -31,7 +31,7 @@ from care_tui.widgets.keys import Keys
 from care_tui.widgets.reader import Reader
 from care_tui.widgets.tab_row import TabRow
 from tests.tui import sample_diagnosis as sample
-from tests.tui.conftest import MakeApp, settle
+from tests.tui.conftest import DOUBT, MakeApp, settle
 
 
 def walk(app: CareApp) -> CaseScreen:
@@ -362,7 +362,8 @@ async def test_f_turns_the_diff_to_the_file_on_disk(make_app: MakeApp) -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "5")
         for side in ("driven", "file", "changed", "driven"):
-            assert text(app).startswith(f"--- {side}")
+            assert f"--- {side}" in text(app)
+            assert (DOUBT in " ".join(text(app).split())) == (side == "file"), "what speaks against it stands above"
             await settle(pilot, "f")
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
