@@ -14,11 +14,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.ecosystems.ardupilot.measures.flown_mission import analyse, distance_to_legs
+from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
 from care_core.ecosystems.ardupilot.measures.mission import ArduPilotFlight
-from care_core.ecosystems.ardupilot.measures.series import statistic
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, find_extractor
 from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.statistic import statistic
+from care_core.ecosystems.vehicles.way import distance_to_legs
 from care_core.logs.base import Table, merge_needs
 from care_core.logs.opening import open_log
 from care_core.profile.reading import read_schema

@@ -10,13 +10,13 @@ import pytest
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.measures.requested import (
-    RequestedMission,
     hover_power,
     internal_resistance,
     mission_asked,
     requested_mission,
 )
 from care_core.ecosystems.measures import Mission
+from care_core.ecosystems.vehicles.way import RequestedMission
 from care_core.logs.base import Table
 from care_core.run import Unavailable
 from tests.tables import TablesLog

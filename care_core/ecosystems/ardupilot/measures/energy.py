@@ -15,10 +15,11 @@ from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, span_of_phase
 from care_core.ecosystems.ardupilot.measures.samples import samples, whole
-from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, series, statistic
+from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, series
 from care_core.ecosystems.coverage import EXTREME, SUM, Bears, Samples
 from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, has, missing
 from care_core.ecosystems.plausible import is_alive
+from care_core.ecosystems.statistic import statistic
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.run import Unavailable, Value, is_known, shown
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +19,6 @@ from care_core.ecosystems.ardupilot.held_missions import LAND, RETURN
 from care_core.ecosystems.ardupilot.measures.modes import flight_of, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import (
     ITEMS,
-    RequestedMission,
     home_of,
     mission_held,
     requested_mission,
@@ -29,8 +27,16 @@ from care_core.ecosystems.ardupilot.measures.samples import samples
 from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.coverage import EXTREME, doubt
 from care_core.ecosystems.measures import Mission, has
+from care_core.ecosystems.vehicles.way import (
+    AIRBORNE_M,
+    METRES_PER_DEGREE,
+    Phase,
+    RequestedMission,
+    Track,
+    distance_to_legs,
+)
 from care_core.logs.base import Wanted, merge_needs
-from care_core.numbers import distinct, known_median, median
+from care_core.numbers import known_median
 from care_core.records import Record
 from care_core.run import Unavailable
 
@@ -42,16 +48,9 @@ NEEDS: Wanted = merge_needs((
 ))  # fmt: skip
 """What `analyse` and the search for missions read."""
 
-FILL_S = 0.05
-"""Spacing to which a thinned track is filled in before distances are taken from it."""
-FILLABLE_S = 0.6
-"""Median spacing above which a corner between two positions could be anything, and nothing is filled in."""
 PASSED_M = 5.0
 """As near to a waypoint it was there: copters and rovers count one as reached within 2 m unless told otherwise."""
-AIRBORNE_M = 2.0
-"""Height above home from which a vehicle counts as airborne."""
 
-_METRES_PER_DEGREE = 111_319.49
 _HOMEWARD = (RETURN, LAND)
 _WITHOUT_AIR = ("rover", "sub")
 _AT_HEIGHT_M = 0.5
@@ -75,44 +74,6 @@ class Waypoint(NamedTuple):
     lat: float
     lng: float
     alt_m: float
-
-
-class Phase(NamedTuple):
-    """A part of the flight that was completed, in seconds of the log."""
-
-    start_s: float
-    end_s: float
-
-    @property
-    def duration_s(self) -> float:
-        return self.end_s - self.start_s
-
-
-class Track(Record, eq=False):
-    """Where the vehicle was: arrays of shape (n,), seconds of the log and metres from home."""
-
-    t: Floats
-    north: Floats
-    east: Floats
-    height: Floats
-
-    def between(self, start_s: float, end_s: float) -> Track | None:
-        """The track from the position before a time to the one after another; None where there are not two."""
-        first = max(int(np.searchsorted(self.t, start_s, side="right")) - 1, 0)
-        part = slice(first, int(np.searchsorted(self.t, end_s, side="left")) + 1)
-        if len(self.t[part]) < 2:
-            return None
-        return Track(self.t[part], self.north[part], self.east[part], self.height[part])
-
-    def filled_in(self) -> Track:
-        """The same track at `FILL_S` or closer: cubic Hermite between positions, velocities by central differences."""
-        steps = np.diff(self.t)
-        if len(steps) < 2 or not FILL_S < median(steps) <= FILLABLE_S or (steps <= 0).any():
-            return self
-        t = distinct(np.concatenate((self.t, np.arange(self.t[0], self.t[-1], FILL_S))))
-        return Track(
-            t, _hermite(t, self.t, self.north), _hermite(t, self.t, self.east), np.interp(t, self.t, self.height)
-        )
 
 
 class FlownMission(Record, eq=False):
@@ -232,30 +193,6 @@ def _ends_by_itself(mission: Mission) -> bool:
     )  # fmt: skip
 
 
-def _hermite(t: Floats, known_t: Floats, known: Floats) -> Floats:
-    """Cubic Hermite interpolation with central-difference slopes."""
-    slope = np.gradient(known, known_t)
-    i = np.clip(np.searchsorted(known_t, t, side="right") - 1, 0, len(known_t) - 2)
-    width = known_t[i + 1] - known_t[i]
-    u = (t - known_t[i]) / width
-    from_left = (1 + 2 * u) * (1 - u) ** 2 * known[i] + u * (1 - u) ** 2 * width * slope[i]
-    from_right = u**2 * (3 - 2 * u) * known[i + 1] + u**2 * (u - 1) * width * slope[i + 1]
-    return np.asarray(from_left + from_right)
-
-
-def distance_to_legs(points: Floats, corners: Floats) -> Floats:
-    """Distance of each point, shape (n, 2), from the nearest of the legs between `corners`, shape (legs + 1, 2)."""
-    if len(corners) < 2 or not len(points):
-        return np.empty(0)
-    nearest = np.full(len(points), np.inf)
-    for start, end in pairwise(corners):  # leg by leg, since a log holds many points
-        leg, along = end - start, points - start
-        share = np.clip((along * leg).sum(axis=1) / max(float((leg**2).sum()), 1e-9), 0.0, 1.0)
-        off = along - share[:, None] * leg
-        nearest = np.minimum(nearest, np.hypot(off[:, 0], off[:, 1]))
-    return nearest
-
-
 def waypoint_offsets(waypoints: Sequence[Waypoint], expected: Sequence[Sequence[float]]) -> list[float]:
     """Distance in metres, height included, of each waypoint from the one it should be."""
     offsets = []
@@ -267,7 +204,7 @@ def waypoint_offsets(waypoints: Sequence[Waypoint], expected: Sequence[Sequence[
 
 def metres_between(lat: Floats, lng: Floats) -> float:
     """Diagonal in metres of the area that positions, in degrees, each of shape (n,), lie in."""
-    north, east = (float(np.ptp(one[np.isfinite(one)])) * _METRES_PER_DEGREE for one in (lat, lng))
+    north, east = (float(np.ptp(one[np.isfinite(one)])) * METRES_PER_DEGREE for one in (lat, lng))
     return math.hypot(north, east * math.cos(math.radians(known_median(lat))))
 
 
@@ -283,7 +220,7 @@ def _way(found: RequestedMission | Unavailable) -> tuple[Floats, tuple[float, fl
 
 
 def _offset(home: Sequence[float], lat: float, lng: float) -> tuple[float, float]:
-    return (lat - home[0]) * _METRES_PER_DEGREE, (lng - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
+    return (lat - home[0]) * METRES_PER_DEGREE, (lng - home[1]) * METRES_PER_DEGREE * math.cos(math.radians(home[0]))
 
 
 def _track(mission: Mission, home: Sequence[float] | None) -> Track | None:
@@ -293,8 +230,8 @@ def _track(mission: Mission, home: Sequence[float] | None) -> Track | None:
     position = position.where(np.isfinite(position["Lat"] + position["Lng"] + position["RelHomeAlt"]))
     if not len(position):
         return None
-    north = (position["Lat"] - home[0]) * _METRES_PER_DEGREE
-    east = (position["Lng"] - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
+    north = (position["Lat"] - home[0]) * METRES_PER_DEGREE
+    east = (position["Lng"] - home[1]) * METRES_PER_DEGREE * math.cos(math.radians(home[0]))
     return Track(position.t, north, east, position["RelHomeAlt"])
 
 

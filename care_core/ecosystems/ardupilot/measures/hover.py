@@ -15,10 +15,11 @@ from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.modes import flight_of
 from care_core.ecosystems.ardupilot.measures.phases import flown_mission
 from care_core.ecosystems.ardupilot.measures.samples import everything, samples
-from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, statistic
+from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS
 from care_core.ecosystems.ardupilot.measures.winged import legs_flown
 from care_core.ecosystems.coverage import USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
+from care_core.ecosystems.statistic import statistic
 from care_core.logs.base import Table, merge_needs
 from care_core.numbers import Floats, median
 from care_core.run import Unavailable, Value

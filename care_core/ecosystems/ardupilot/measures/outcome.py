@@ -9,13 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.measures.events import CUT, NOT_FLOWN, UNRECORDED, crash_of, failed, forced, is_over
-from care_core.ecosystems.ardupilot.measures.flown_mission import (
-    AIRBORNE_M,
-    NEEDS,
-    FlownMission,
-    analyse,
-    metres_between,
-)
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, FlownMission, analyse, metres_between
 from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.ardupilot.measures.route import landing_error
@@ -24,6 +18,7 @@ from care_core.ecosystems.ardupilot.measures.shortfall import event_clause, shor
 from care_core.ecosystems.coverage import SUM, doubt
 from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
+from care_core.ecosystems.vehicles.way import AIRBORNE_M
 from care_core.logs.base import Wanted
 from care_core.run import Check, Unavailable, Value, is_known
 

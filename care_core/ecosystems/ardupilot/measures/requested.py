@@ -7,8 +7,7 @@ before the flight, so a vehicle that never armed has it too.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Literal
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,14 +32,13 @@ from care_core.ecosystems.ardupilot.measures.samples import samples, whole
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.coverage import USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
+from care_core.ecosystems.vehicles.way import METRES_PER_DEGREE, NUMBERS, Ending, RequestedMission
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
-from care_core.records import Record
 from care_core.run import Unavailable, Value
 from care_core.text import log_time
 
 Floats = NDArray[np.float64]
-Ending = Literal["return", "land", "open"]
 
 ITEMS: Wanted = {
     **held_missions.READS,
@@ -57,53 +55,6 @@ _MOST_ITEMS = 2000
 """Items that are followed: a jump without end would never stop."""
 _HOME = 1
 """Type of an ORGN record: home; 0 is the origin of the estimator."""
-_SHARP_DEG = 60.0
-"""Corners from which a vehicle that turns on the spot stops and does so (AR_PivotTurn.cpp: WP_PIVOT_ANGLE)."""
-_LEVEL_M = 0.5
-"""Height difference below which a leg is level."""
-_METRES_PER_DEGREE = 111_319.49
-
-
-class RequestedMission(Record, eq=False):
-    """A mission in metres from home. Legs begin above home, at the height of the take-off."""
-
-    points: Floats
-    """Shape (legs + 1, 3): north, east and height of the corners, the first above home."""
-    holds_s: Floats
-    """Shape (legs,): seconds to wait at the end of each leg."""
-    speeds: Floats
-    """Shape (legs,): commanded speed in m/s, 0 where the vehicle's own parameter rules."""
-    ending: Ending
-    """Whether it returns to home, lands where the last leg ends, or says neither."""
-
-    @property
-    def lengths(self) -> Floats:
-        """Horizontal length of each leg in metres."""
-        step = np.diff(self.points[:, :2], axis=0)
-        return np.asarray(np.hypot(step[:, 0], step[:, 1]))
-
-    @property
-    def rises(self) -> Floats:
-        """How far each leg leads up, in metres."""
-        return np.asarray(np.diff(self.points[:, 2]))
-
-    @property
-    def turns_deg(self) -> Floats:
-        """Change of course, 0 to 180 degrees, at each corner."""
-        step = np.diff(self.points[:, :2], axis=0)
-        course = np.degrees(np.arctan2(step[:, 1], step[:, 0]))
-        return np.asarray(np.abs((np.diff(course) + 180.0) % 360.0 - 180.0))
-
-    @property
-    def corners_deg(self) -> Floats:
-        """Change of course at each corner that is flown through without a wait."""
-        return np.asarray(self.turns_deg[self.holds_s[:-1] == 0])
-
-    @property
-    def commanded_speed(self) -> float:
-        """The speed that is commanded over most of the way, 0 where that is none."""
-        chosen = {speed: self.lengths[self.speeds == speed].sum() for speed in dict.fromkeys(self.speeds.tolist())}
-        return float(max(chosen, key=lambda speed: float(chosen[speed]), default=0.0))
 
 
 def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
@@ -204,8 +155,8 @@ def _place_of(table: Table | None) -> tuple[float, float, float] | None:
 
 
 def _offset(item: Item, home: Sequence[float]) -> tuple[float, float]:
-    north = (item.lat - home[0]) * _METRES_PER_DEGREE
-    return north, (item.lng - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
+    north = (item.lat - home[0]) * METRES_PER_DEGREE
+    return north, (item.lng - home[1]) * METRES_PER_DEGREE * math.cos(math.radians(home[0]))
 
 
 def _height(item: Item, home: Sequence[float]) -> float:
@@ -221,36 +172,14 @@ def _place(item: Item, home: Sequence[float], before: tuple[float, float, float]
 # --- the mission ------------------------------------------------------------------------------------------------
 
 
-_MISSION: Mapping[str, Callable[[RequestedMission], float]] = {
-    "path_length": lambda a: float(a.lengths.sum()),
-    "legs": lambda a: float(len(a.lengths)),
-    "leg_variation": lambda a: float(a.lengths.std() / max(a.lengths.mean(), 1e-9)),
-    "climb": lambda a: float(np.maximum(a.rises, 0).sum()),
-    "climbing_legs": lambda a: float((a.rises > _LEVEL_M).sum()),
-    "descent": lambda a: float(np.maximum(-a.rises, 0).sum()),
-    "descending_legs": lambda a: float((a.rises < -_LEVEL_M).sum()),
-    "flown_corners": lambda a: float(len(a.corners_deg)),
-    "corner_turn": lambda a: float(a.corners_deg.mean()) if len(a.corners_deg) else 0.0,
-    "sharp_corners": lambda a: float((a.corners_deg > _SHARP_DEG).sum()),
-    "sharp_turns": lambda a: float(a.turns_deg[a.turns_deg > _SHARP_DEG].sum()),
-    "hold_time": lambda a: float(a.holds_s.sum()),
-    "stops": lambda a: float((a.holds_s > 0).sum()),
-    "commanded_speed": lambda a: a.commanded_speed,
-    "takeoff_height": lambda a: float(a.points[0, 2]),
-    "end_height": lambda a: float(a.points[-1, 2]),
-    "return_distance": lambda a: math.hypot(*a.points[-1, :2]) if a.ending == "return" else 0.0,
-    "returns": lambda a: float(a.ending == "return"),
-}
-
-
-@extractor("mission_asked", needs=ITEMS, unit="", args={"what": one_of(", ".join(_MISSION), *_MISSION)})
+@extractor("mission_asked", needs=ITEMS, unit="", args={"what": one_of(", ".join(NUMBERS), *NUMBERS)})
 def mission_asked(mission: Mission, args: Args) -> Value:
     """One number of the mission that the vehicle was given: lengths and heights in m, times in s, turns in degrees,
     `commanded_speed` in m/s (0: none), `returns` 1 or 0; corners are `sharp` from 60 degrees, `sharp_turns` adds up
     theirs, those with a wait too."""
-    measure = _MISSION.get(str(args.get("what")))
+    measure = NUMBERS.get(str(args.get("what")))
     if measure is None:
-        return Unavailable(f"there is no '{args.get('what')}' of a mission", f"use one of {', '.join(_MISSION)}")
+        return Unavailable(f"there is no '{args.get('what')}' of a mission", f"use one of {', '.join(NUMBERS)}")
     found = mission.shared(requested_mission)
     return found if isinstance(found, Unavailable) else measure(found)
 

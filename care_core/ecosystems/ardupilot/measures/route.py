@@ -12,9 +12,9 @@ from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
 from care_core.ecosystems.ardupilot.measures.requested import requested_mission
-from care_core.ecosystems.ardupilot.measures.series import statistic
 from care_core.ecosystems.coverage import EXTREME, SUM
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
+from care_core.ecosystems.statistic import statistic
 from care_core.run import Unavailable, Value
 
 

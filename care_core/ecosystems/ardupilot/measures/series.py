@@ -11,15 +11,14 @@ from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
-from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
+from care_core.ecosystems.measures import Args, Mission, extractor, missing
+from care_core.ecosystems.statistic import STATISTIC, statistic
 from care_core.logs.base import Table, Wanted, merge_needs
-from care_core.numbers import quantile
 from care_core.run import Unavailable, Value
 
 Floats = NDArray[np.float64]
 
 MIN_ROWS = 5
-_STATISTIC = one_of("mean, max, min, std, rms or peak (95th percentile)", "mean", "max", "min", "std", "rms", "peak")
 
 
 def series(
@@ -51,23 +50,6 @@ def series(
     return table
 
 
-def statistic(values: Floats, stat: str) -> Value:
-    """One number from many. `peak` is the 95th percentile, which one bad sample cannot move."""
-    measures: dict[str, Callable[[Floats], object]] = {
-        "mean": np.mean,
-        "max": np.max,
-        "min": np.min,
-        "std": np.std,
-        "rms": lambda x: np.sqrt(np.mean(x**2)),
-        "peak": lambda x: quantile(x, 0.95),
-    }
-    if not len(values):
-        return Unavailable("the vehicle was never under way")
-    if stat not in measures:
-        return Unavailable(f"there is no statistic '{stat}'", f"use one of {', '.join(measures)}")
-    return float(measures[stat](values))  # type: ignore[arg-type]
-
-
 def register(
     name: str, wanted: Wanted, unit: str, doc: str, measure: Callable[[Table, Mission, Args], Floats],
     *, stat: str, args: Mapping[str, str] | None = None,
@@ -89,6 +71,6 @@ def register(
 
     compute.__module__ = measure.__module__
     compute.__doc__ = f"{doc} Statistic: {stat} unless `stat` says otherwise."
-    described = {"stat": _STATISTIC, **PHASE_ARGS, **(args or {})}
+    described = {"stat": STATISTIC, **PHASE_ARGS, **(args or {})}
     needed = rests.of(channel, *(required if columns is None else ()))
     extractor(name, needs=merge_needs((NEEDS, wanted)), unit=unit, args=described, rests_on=needed)(compute)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS
-from care_core.ecosystems.ardupilot.measures.series import register, series, statistic
+from care_core.ecosystems.ardupilot.measures.series import register, series
 from care_core.ecosystems.measures import Args, Mission, extractor, one_of
+from care_core.ecosystems.statistic import statistic
 from care_core.ecosystems.vehicles import motor_outputs
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.run import Unavailable, Value

@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 from care_core.ecosystems.ardupilot.held_missions import LAND, LAND_START, LOITER_TIME, LOITER_TURNS, RETURN
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures import rests
-from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse, distance_to_legs
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse
 from care_core.ecosystems.ardupilot.measures.phases import flown_mission
 from care_core.ecosystems.ardupilot.measures.requested import ITEMS, mission_held, requested_mission
 from care_core.ecosystems.ardupilot.measures.samples import samples
-from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, statistic
+from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS
 from care_core.ecosystems.coverage import EXTREME, USUAL, Samples, Span
 from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, missing, numeric, one_of
+from care_core.ecosystems.statistic import statistic
+from care_core.ecosystems.vehicles.way import distance_to_legs
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import median
 from care_core.records import Record
