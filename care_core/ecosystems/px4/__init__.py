@@ -21,7 +21,14 @@ class Px4(Ecosystem):
     name = "px4"
     title = "PX4"
     dialects = (QGC_PARAMS,)
-    measures = ("care_core.ecosystems.px4.missions",)
+    measures = (
+        "care_core.ecosystems.px4.missions",
+        "care_core.ecosystems.px4.measures.requested",
+        "care_core.ecosystems.px4.measures.route",
+        "care_core.ecosystems.px4.measures.signals",
+        "care_core.ecosystems.px4.measures.energy",
+        "care_core.ecosystems.px4.measures.outcome",
+    )
 
     def model(self, log: Log) -> RunModel:
         from care_core.ecosystems.px4.flight import Px4Flight

@@ -27,6 +27,7 @@ Ending = Literal["return", "land", "open"]
 
 _SHARP_DEG = 60.0
 """Corners from which a vehicle that turns on the spot stops and does so (AR_PivotTurn.cpp: WP_PIVOT_ANGLE)."""
+_AT_HEIGHT_M = 0.5
 _LEVEL_M = 0.5
 """Height difference below which a leg is level."""
 
@@ -132,6 +133,38 @@ class Track(Record, eq=False):
         return Track(
             t, _hermite(t, self.t, self.north), _hermite(t, self.t, self.east), np.interp(t, self.t, self.height)
         )
+
+
+def phases_home(
+    track: Track, homeward_s: float, end_s: float, slow_below_m: float, *, returns: bool
+) -> dict[str, Phase]:
+    """The way home by height: the climb to the return height, the flight at it, the descent, the last metres.
+
+    Args:
+        homeward_s: when the vehicle set out for home. end_s: when it was disarmed.
+        slow_below_m: height above home from which a landing is slow.
+        returns: whether it flies home, or lands where it is.
+    """
+    after = track.t >= homeward_s
+    t, height = track.t[after], track.height[after]
+    if len(t) < 3 or height.max() < AIRBORNE_M:
+        return {}
+    high = np.flatnonzero(height >= height.max() - _AT_HEIGHT_M)
+    top_s, leave_s = float(t[high[0]]), float(t[high[-1]])
+    phases = {"return_climb": Phase(homeward_s, top_s)}
+    if height[-1] > AIRBORNE_M:
+        return phases
+    phases["return_cruise"] = Phase(top_s, leave_s)
+    if returns:
+        phases["return"] = Phase(homeward_s, leave_s)
+    low = np.flatnonzero((t >= leave_s) & (height <= slow_below_m))
+    if not len(low):  # a height that no landing ends below
+        return phases
+    slow_s = float(t[low[0]])
+    if height.max() > slow_below_m + 1.0:
+        phases["descent"] = Phase(leave_s, slow_s)
+    phases["touchdown"] = Phase(slow_s, end_s)
+    return phases
 
 
 def distance_to_legs(points: Floats, corners: Floats) -> Floats:

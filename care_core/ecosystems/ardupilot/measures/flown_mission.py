@@ -34,6 +34,7 @@ from care_core.ecosystems.vehicles.way import (
     RequestedMission,
     Track,
     distance_to_legs,
+    phases_home,
 )
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import known_median
@@ -53,7 +54,6 @@ PASSED_M = 5.0
 
 _HOMEWARD = (RETURN, LAND)
 _WITHOUT_AIR = ("rover", "sub")
-_AT_HEIGHT_M = 0.5
 _STARTED = re.compile(r"Mission: (\d+) ")
 _REACHED = re.compile(r"(?:Reached (?:command|waypoint)|Passed waypoint) #(\d+)")
 """A copter says it when the wait is over (ArduCopter/mode_auto.cpp), rovers and planes when they arrive
@@ -260,9 +260,9 @@ def _phases(
     homeward, way = _homeward(mission, started), mission.shared(requested_mission)
     returns = isinstance(way, Unavailable) or way.ending == "return"
     if homeward is not None and track is not None:
-        phases.update(
-            {(name, 0): phase for name, phase in _return_phases(mission, track, homeward, returns=returns).items()}
-        )
+        slow_below_m = _number(mission.settings.get("LAND_ALT_LOW"), 1000.0) / 100
+        home = phases_home(track, homeward, mission.end_s, slow_below_m, returns=returns)
+        phases.update({(name, 0): phase for name, phase in home.items()})
     return phases
 
 
@@ -300,31 +300,6 @@ def _homeward(mission: Mission, started: Mapping[int, float]) -> float | None:
     homeward = (mode.start_s for mode in modes_in_force(mission) if mode.way in ("return", "land"))
     times += [t for t in homeward if t >= mission.start_s]
     return min(times, default=None)
-
-
-def _return_phases(mission: Mission, track: Track, homeward_s: float, *, returns: bool) -> dict[str, Phase]:
-    """The way home by height: the climb to the return height, the flight at it, the descent, the last metres."""
-    after = track.t >= homeward_s
-    t, height = track.t[after], track.height[after]
-    if len(t) < 3 or height.max() < AIRBORNE_M:
-        return {}
-    high = np.flatnonzero(height >= height.max() - _AT_HEIGHT_M)
-    top_s, leave_s = float(t[high[0]]), float(t[high[-1]])
-    phases = {"return_climb": Phase(homeward_s, top_s)}
-    if height[-1] > AIRBORNE_M:
-        return phases
-    phases["return_cruise"] = Phase(top_s, leave_s)
-    if returns:
-        phases["return"] = Phase(homeward_s, leave_s)
-    slow_below = _number(mission.settings.get("LAND_ALT_LOW"), 1000.0) / 100
-    low = np.flatnonzero((t >= leave_s) & (height <= slow_below))
-    if not len(low):  # a height that no landing ends below
-        return phases
-    slow_s = float(t[low[0]])
-    if height.max() > slow_below + 1.0:
-        phases["descent"] = Phase(leave_s, slow_s)
-    phases["touchdown"] = Phase(slow_s, mission.end_s)
-    return phases
 
 
 def _number(value: float | str | None, default: float) -> float:

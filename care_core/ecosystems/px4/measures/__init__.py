@@ -1,0 +1,1 @@
+"""What profiles measure of PX4 flights."""

@@ -1,0 +1,138 @@
+"""Whether a PX4 flight did what it set out to do, and the events that speak against it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.coverage import SUM, Samples
+from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
+from care_core.ecosystems.px4 import upset
+from care_core.ecosystems.px4.flight import FLAGS, MESSAGES, RESULT, STATUS
+from care_core.ecosystems.px4.flown_mission import mission_outcome
+from care_core.ecosystems.px4.measures.flown import NEEDS, NOT_FLOWN, flight_of, flown_mission, is_armed
+from care_core.ecosystems.px4.measures.route import landing_error
+from care_core.ecosystems.vehicles import way_of
+from care_core.logs.base import Wanted, merge_needs
+from care_core.run import Unavailable, Value, is_known
+
+TOLERANCE_M = 5.0
+CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
+
+_REASONS = {
+    "battery": ("battery_warning", "battery_unhealthy", "battery_low_remaining_time"),
+    "geofence": ("geofence_breached",),
+    "position": ("local_position_invalid", "global_position_invalid", "local_velocity_invalid"),
+    "attitude": ("attitude_invalid", "angular_velocity_invalid", "fd_critical_failure"),
+    "motor": ("fd_motor_failure", "fd_esc_arming_failure", "fd_imbalanced_prop"),
+    "link": ("manual_control_signal_lost", "gcs_connection_lost", "offboard_control_signal_lost"),
+    "mission": ("mission_failure",),
+    "wind": ("wind_limit_exceeded",),
+}
+"""What a failsafe is about: the flags of failsafe_flags (FailsafeFlags.msg) that are up while it acts."""
+_LEAST_WARNING = {"battery_warning": 2}
+"""battery_warning counts from critical on (battery_status.msg); the others are true or false."""
+_EVENTS: Wanted = merge_needs((
+    NEEDS, upset.READS, {FLAGS: tuple(flag for flags in _REASONS.values() for flag in flags), MESSAGES: ("message",)},
+))  # fmt: skip
+
+
+def everything(mission: Mission, args: Args) -> Iterator[Samples]:
+    """Whatever comes steadily: where nothing of it was recorded, no event was either."""
+    streams = [table.t for topic, table in mission.tables.items() if topic not in (MESSAGES, RESULT)]
+    if streams:
+        yield Samples("the flight", np.concatenate(streams), [(mission.start_s, mission.end_s)], SUM)
+
+
+def failsafe_s(mission: Mission) -> float | None:
+    """When a failsafe first acted in the mission, None where none did."""
+    return flight_of(mission).first_s(STATUS, "failsafe", 1, (mission.start_s, mission.end_s))
+
+
+def reasons_of_failsafe(mission: Mission) -> tuple[str, ...]:
+    """What the failsafes that acted were about."""
+    acted_s = failsafe_s(mission)
+    if acted_s is None:
+        return ()
+    flight, near = flight_of(mission), (acted_s - 1.0, acted_s + 1.0)
+    return tuple(
+        about
+        for about, flags in _REASONS.items()
+        if any(flight.at_least(FLAGS, flag, _LEAST_WARNING.get(flag, 1), near) for flag in flags)
+    )
+
+
+def lost_s(mission: Mission) -> float | None:
+    """When control was lost or the vehicle hit the ground in the mission, None where neither happened."""
+    flight = flight_of(mission)
+    hit, lost = upset.hit(flight), upset.lost_control(flight)
+    times = [one.time_s for one in (hit, lost) if one is not None]
+    return next((t for t in sorted(times) if mission.start_s <= t <= mission.end_s + 1.0), None)
+
+
+def flew_automatically(mission: Mission) -> bool:
+    """Whether the mode that flies missions was in force."""
+    modes = flight_of(mission).modes_during((mission.start_s, mission.end_s))
+    return any(way_of("px4", mode) == "mission" for mode in modes)
+
+
+@extractor("px4_mission_success", needs=_EVENTS, unit="")
+def mission_success(mission: Mission, args: Args) -> Value:
+    """1 when every waypoint was reached, the vehicle landed where the mission ends (within `tolerance_m` of it) and
+    disarmed, with no loss of control, no hard contact and no failsafe; else 0. A refused arming is 0."""
+    if not is_armed(mission):
+        return 0.0
+    if not flew_automatically(mission):
+        return Unavailable("no mission was flown")
+    if lost_s(mission) is not None or failsafe_s(mission) is not None:
+        return 0.0
+    return _flown_whole(mission) if mission.ended else CUT
+
+
+def _flown_whole(mission: Mission) -> Value:
+    """1 where all waypoints were reached and it came down where the mission ends."""
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    if not has(mission.table(RESULT), "seq_reached"):
+        return Unavailable("the log does not say which items were reached", f"record {RESULT}", RESULT)
+    if not flown.all_reached:
+        outcome = mission_outcome(flight_of(mission), (mission.start_s, mission.end_s))
+        return outcome if flown.items is None else 0.0
+    off_m = landing_error(mission, {})
+    if flown.end is None:
+        return 1.0
+    return float(off_m <= float(mission.spec.get("tolerance_m", TOLERANCE_M))) if is_known(off_m) else off_m
+
+
+@extractor("px4_failsafe", needs=_EVENTS, unit="", args={"about": one_of(", ".join(_REASONS), *_REASONS)},
+           rests_on=everything)  # fmt: skip
+def failsafe(mission: Mission, args: Args) -> Value:
+    """1 when a failsafe acted in flight, of what `about` names or of any kind, else 0."""
+    if not is_armed(mission):
+        return NOT_FLOWN
+    about = str(args.get("about", ""))
+    return float(about in reasons_of_failsafe(mission) if about else failsafe_s(mission) is not None)
+
+
+@extractor("px4_lost", needs=_EVENTS, unit="", rests_on=everything)
+def lost(mission: Mission, args: Args) -> Value:
+    """1 when control was lost in the air, or the vehicle hit the ground at speed, else 0."""
+    return float(lost_s(mission) is not None) if is_armed(mission) else NOT_FLOWN
+
+
+@extractor("px4_arming_refused", needs=_EVENTS, unit="")
+def arming_refused(mission: Mission, args: Args) -> Value:
+    """1 when arming was refused to the end of the log, else 0."""
+    return float(not is_armed(mission))
+
+
+@extractor("px4_mission_broken_off", needs=_EVENTS, unit="")
+def mission_broken_off(mission: Mission, args: Args) -> Value:
+    """1 when the vehicle left the mode that flies missions before all waypoints were reached, else 0."""
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    modes = flight_of(mission).modes_during((mission.start_s, mission.end_s))
+    return float(not flown.all_reached and bool(modes) and way_of("px4", modes[-1]) != "mission")
