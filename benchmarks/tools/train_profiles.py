@@ -80,6 +80,13 @@ SOURCES = {
         " frame, site) in which no hardware failed; DataFlash logs, read by `care ingest`.",
         hardware="data/sub/table.csv",
     ),
+    "px4": Source(
+        ("data/px4/table.tar.xz",),
+        "Missions of the PX4 v1.15.4 firmware in its simulation in hardware (SIH), recorded by this project under random "
+        "configurations and winds: those of 0 flights of 0 settings (mission, vehicle, site) in which no hardware "
+        "failed; ULog files, read by `care ingest`.",
+        hardware="data/px4/table.csv",
+    ),
     "move_base": Source(
         ("data/move_base/train.tar.xz",),
         "301 missions of the ROS noetic navigation stack (move_base, navfn, dwa_local_planner, costmap_2d) driving a "

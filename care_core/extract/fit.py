@@ -44,6 +44,8 @@ def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle) -> Iterator[str]:
         yield other
     elif is_other_vehicle(schema, vehicle):
         yield f"it is for {_a(schema.match['vehicle'])}, this is {_a(vehicle.kind)}"
+    elif (airframe := schema.match.get("airframe")) and log.facts.get("vehicle", airframe) != airframe:
+        yield f"it is for {_a(airframe)}, this is {_a(log.facts['vehicle'])}"
     elif other := _other_plugin(log, schema):
         yield other
     elif not coverage.found:
@@ -64,8 +66,12 @@ def _other_plugin(log: Log, schema: Schema) -> str:
 def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:
     """What the log says of its robot that is not what the profile was learned on."""
     for key, text in schema.match.items():
-        if key != "vehicle" and log.facts.get(key) and text.casefold() not in log.facts[key].casefold():
-            yield f"the log's {key} is '{log.facts[key]}', the profile is for '{text}'"
+        if (
+            key not in ("vehicle", "airframe")
+            and log.facts.get(key)
+            and text.casefold() not in log.facts[key].casefold()
+        ):
+            yield f"the log's {key} is '{told}', the profile is for '{text}'"
     if schema.learned_elsewhere:
         yield schema.learned_elsewhere
     if schema.match.get("vehicle") == "rover" and vehicle.name in UNLIKE_ROVERS:

@@ -157,6 +157,7 @@ class _Match(Strict):
     """What a log must say to be of this platform; each text is searched in the log's facts, ignoring case."""
 
     firmware: str = ""
+    airframe: str = ""
     frame: str = ""
     stack: str = ""
     vehicle: str = ""

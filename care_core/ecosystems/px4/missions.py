@@ -9,25 +9,25 @@ import numpy as np
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.coverage import SUM, Samples, doubt
-from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind
+from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric
 from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.checks.kill_switch import killed_aloft_s
 from care_core.ecosystems.px4.flight import (
     AIRBORNE_M,
     BARELY_M,
-    FLAGS,
     LANDED,
     MESSAGES,
-    POSITION,
     READS,
     RESULT,
-    RESULT_FIELDS,
     ROVER,
     STATUS,
     Px4Flight,
     Span,
 )
 from care_core.ecosystems.px4.flown_mission import mission_outcome
+from care_core.ecosystems.px4.measures.flown import NEEDS, is_armed, span_of_phase
+from care_core.ecosystems.px4.measures.outcome import failsafe_s, flew_automatically, lost_s
+from care_core.ecosystems.px4.measures.shortfall import evidence, shortfall
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.logs.base import Table, Wanted
 from care_core.records import replace
@@ -45,20 +45,15 @@ class Px4Missions(MissionKind):
     """From arming to disarming."""
 
     name = "px4_flight"
-    args: Mapping[str, str] = {}
+    args: Mapping[str, str] = {"tolerance_m": numeric("how far from where the mission ends a landing may be")}
 
     def needs(self, spec: Args) -> Wanted:
-        return {
-            STATUS: ("arming_state", "nav_state", "failsafe", "failure_detector_status", "vehicle_type"),
-            LANDED: ("landed",),
-            POSITION: ("z",),
-            RESULT: RESULT_FIELDS,
-            FLAGS: ("fd_critical_failure", "fd_motor_failure"),
-            MESSAGES: ("message",),
-        }
+        return NEEDS
 
     def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
         flight = _flight(model)
+        if not flight.armed and flight.complaints:
+            return (Mission(model, tables, 0.0, flight.end_s, True, spec),)
         closed = len(flight.armed) - flight.ends_armed
         return tuple(
             Mission(model, tables, start_s, end_s, number < closed, spec)
@@ -69,9 +64,24 @@ class Px4Missions(MissionKind):
         return ""
 
     def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
-        return ()
+        return evidence(mission)
+
+    def shortfall(self, mission: Mission) -> tuple[str, ...]:
+        return shortfall(mission)
+
+    def is_decided(self, mission: Mission) -> bool:
+        return mission.ended or lost_s(mission) is not None or failsafe_s(mission) is not None
+
+    def checks(self, mission: Mission) -> tuple[Check, ...]:
+        return () if not is_armed(mission) or flew_automatically(mission) else self.outcome(mission)
+
+    def span(self, mission: Mission, phase: str) -> tuple[float, float] | None:
+        span = span_of_phase(mission, {"phase": phase})
+        return None if isinstance(span, Unavailable) else span
 
     def outcome(self, mission: Mission) -> tuple[Check, ...]:
+        if not is_armed(mission):
+            return (Check("armed", 0.0, "the vehicle armed", "arming was refused"),)
         return tuple(_checks(_flight(mission.model), (mission.start_s, mission.end_s), ended=mission.ended))
 
     def modes(self, mission: Mission) -> tuple[str, ...]:
