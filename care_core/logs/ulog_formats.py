@@ -139,8 +139,10 @@ class Layout:
 
     @cached_property
     def stamp_offset(self) -> int | None:
-        """Bytes ahead of the time, in microseconds since the vehicle booted; None where a topic does not say it."""
-        found = self.find("timestamp")
+        """Bytes ahead of the time, in microseconds since the vehicle booted; None where a topic does not say it. It
+        comes first, also where its name is damaged."""
+        first = next(iter(self._fields), "")
+        found = self.find("timestamp") or self.find(first)
         return found.offset if found is not None and found.dtype == TYPES["uint64_t"] else None
 
 

@@ -285,9 +285,9 @@ class _Walk:
         if not _IS_KIND[kind] and follows == 2:
             return self._leave(pos, over)
         resumed = self._resume(pos)
-        if is_sound and resumed >= over:
+        if is_sound and resumed >= over:  # what is broken lies behind it
             self._take(pos, kind, over, number)
-            return over if resumed == over else self._leave(over, resumed)
+            return over
         return self._leave(pos, resumed)
 
     def _header(self, pos: int) -> tuple[int, int, tuple[int, int]]:
@@ -372,7 +372,7 @@ class _Walk:
 
     def _take_subscription(self, pos: int, body: bytes) -> None:
         multi_id, number = body[0], body[1] | body[2] << 8
-        name = body[3:].rstrip(b"\0").decode("utf-8", "replace")
+        name = self._declared_name(pos, body[3:].rstrip(b"\0").decode("utf-8", "replace"))
         try:
             topic = Topic(name, multi_id, self._layouts.of(name))
         except UnusableFormatError as err:
@@ -389,6 +389,17 @@ class _Walk:
             self._found.damage.append(Damage(f"more than {limits.ULOG_TOPICS} topics", pos))
         else:
             self._declare(number, topic, MESSAGE_HEADER + stamp_at)
+
+    def _declared_name(self, pos: int, name: str) -> str:
+        """The name of a format: of one that nobody declares, what differs from it in one character."""
+        if name in self._formats:
+            return name
+        near = [one for one in self._formats if len(one) == len(name)
+                and sum(a != b for a, b in zip(one, name, strict=True)) == 1]  # fmt: skip
+        if len(near) != 1:
+            return name
+        self._found.damage.append(Damage(f"topic {name} is not declared: read as {near[0]}", pos))
+        return near[0]
 
     def _declare(self, number: int, topic: Topic, stamp_at: int) -> None:
         """Messages with an id are those of a topic from here on."""
