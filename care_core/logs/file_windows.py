@@ -53,7 +53,7 @@ class FileBytes:
         self._path, self._stream = path, stream
         self._size = stream.seek(0, SEEK_END)
         self._at, self._end, self._block = 0, 0, b""
-        np.empty(_KEPT, np.uint8)  # freed at once
+        keep_freed()
 
     def __len__(self) -> int:
         return self._size
@@ -234,6 +234,11 @@ class FileArray:
                 piece = np.append(piece, np.zeros(high - there, dtype=np.uint8))
             yield near, piece
             first = last
+
+
+def keep_freed() -> None:
+    """Have what is freed from now on stay with the process: taking the pages of each large array anew is slow."""
+    np.empty(_KEPT, np.uint8)  # freed at once
 
 
 def give_back(size: int) -> None:

@@ -22,7 +22,7 @@ from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import BACK_S, PAUSE_S, STEP_S, find_clock
 from care_core.logs.damage import summarised
-from care_core.logs.file_windows import FileArray, Offsets
+from care_core.logs.file_windows import FileArray, Offsets, keep_freed
 from care_core.logs.ulog_formats import RecordField, Value, read_value
 from care_core.logs.ulog_records import (
     DEFAULT,
@@ -53,6 +53,9 @@ _SYSTEM_DEFAULT, _SETUP_DEFAULT = 1, 2
 _VEHICLE_TYPES = {1: "multicopter", 2: "fixed wing", 3: "rover", 4: "airship"}
 _GPS_TOPICS = ("vehicle_gps_position", "sensor_gps")
 _EARLIEST_S = datetime(2005, 1, 1, tzinfo=timezone.utc).timestamp()
+_LATEST_S = 1e10
+_SAMPLES = 64
+"""Rows of a GPS topic that are looked at first for one that knows the time."""
 _NEAR = 100
 """Messages ahead of a place among which the latest tells its time: several tasks write into one log."""
 
@@ -76,6 +79,7 @@ class Px4Log:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        keep_freed()
         self._data = FileArray.open(path)
         contents = read_contents(self._data)
         topics = [(topic, places, stamps.astype(np.float64)) for topic, places, stamps in each_of(contents)]
@@ -165,17 +169,23 @@ class Px4Log:
     def start(self) -> str | None:
         """Wall clock of the first record (UTC), from the first GPS message that knows it."""
         for own in (self._channels[name] for name in _GPS_TOPICS if name in self._channels):
-            low, count = 0, 1
-            while low < len(own.t):
-                table = self._tables({"": (_rows(own, slice(low, low + count)), ("time_utc_usec",))})[""]
-                if "time_utc_usec" not in table.columns:
-                    break
-                utc_s = table["time_utc_usec"] / 1e6 - table.t
-                known = utc_s[(utc_s > _EARLIEST_S) & (utc_s < 1e10)]
-                if len(known):
-                    return datetime.fromtimestamp(float(known[0]), timezone.utc).isoformat(timespec="seconds")
-                low, count = low + count, 10 * count
+            last = len(own.t) - 1
+            rows = np.unique(np.linspace(0, last, min(_SAMPLES, last + 1)).astype(np.int64))  # few bytes of a large log
+            if len(known := np.flatnonzero(np.isfinite(self._utc_s(own, rows)))):
+                first = int(known[0])
+                near = np.arange(rows[max(first - 1, 0)], rows[first] + 1)
+                utc_s = self._utc_s(own, near)
+                start_s = float(utc_s[np.isfinite(utc_s)][0])
+                return datetime.fromtimestamp(start_s, timezone.utc).isoformat(timespec="seconds")
         return None
+
+    def _utc_s(self, own: _Messages, rows: NDArray[np.int64]) -> Floats:
+        """Wall clock of the first record by rows of a GPS topic, seconds since 1970; NaN of those that do not know."""
+        table = self._tables({"": (_rows(own, rows), ("time_utc_usec",))})[""]
+        if "time_utc_usec" not in table.columns:
+            return np.full(len(rows), np.nan)
+        utc_s = table["time_utc_usec"] / 1e6 - table.t
+        return np.where((utc_s > _EARLIEST_S) & (utc_s < _LATEST_S), utc_s, np.nan)
 
     @property
     def multiple(self) -> Mapping[str, tuple[tuple[Value, ...], ...]]:
@@ -241,7 +251,7 @@ class _Times:
         return float(max(t[t <= self._end_s], default=0.0))
 
 
-def _rows(own: _Messages, rows: slice | NDArray[np.bool_]) -> _Messages:
+def _rows(own: _Messages, rows: slice | NDArray[Any]) -> _Messages:
     return _Messages(own.topic, own.places[rows], own.t[rows])
 
 

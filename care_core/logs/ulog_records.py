@@ -44,12 +44,13 @@ _MOST = np.zeros(256, np.uint16)
 for _kind, (_low, _high) in _LENGTHS.items():
     _LEAST[_kind], _MOST[_kind] = _low, _high
 _IS_KIND = _LEAST <= _MOST
+_IS_LENGTH = tuple(zip(_LEAST.tolist(), _MOST.tolist(), strict=True))
 
 _MORE = 1 << 13
 """Bytes behind a window that are looked at with it: a record that begins in it has its stamp there."""
 _FURTHEST_STAMP = 4_000
-_AHEAD = 5
-"""So many records that can follow each other make a place where the walk goes on."""
+_AHEAD, _FAR_AHEAD = 5, 50
+"""So many records that can follow each other make a place where the walk goes on; so many are looked at together."""
 _MAX_IDS = 1 << 16
 
 
@@ -148,8 +149,10 @@ class _Walk:
         self._topic_of = np.zeros(_MAX_IDS, np.uint16)
         self._stamp_at = np.zeros(limits.ULOG_TOPICS, np.int64)
         self._declarations = 0
+        self._chain_end, self._chain_rows = 0, dict[int, int]()
+        """What `_follow` found last, with the rows of its places."""
         self._resumes: tuple[int, int, list[int]] = (0, 0, [])
-        self._window: tuple[int, int, Bytes] = (0, 0, np.empty(0, np.uint8))
+        self._window: tuple[int, int, memoryview] = (0, 0, memoryview(b""))
         """The bytes of the window that the walk is in, and between which of the file's these are."""
         self._pos = FILE_HEADER
         head = data.between(0, FILE_HEADER).tobytes()
@@ -181,7 +184,7 @@ class _Walk:
     def _bytes(self, low: int, high: int) -> bytes:
         first, last, piece = self._window
         if first <= low and high <= last:
-            return piece[low - first : high - first].tobytes()
+            return bytes(piece[low - first : high - first])
         return self._data.between(low, high).tobytes()
 
     def _read_flags(self) -> list[int]:
@@ -208,7 +211,7 @@ class _Walk:
     def through(self, low: int, piece: Bytes) -> None:
         """Walk on to the end of a window that begins at a byte of the file, with what is behind it."""
         high = min(low + file_windows.WINDOW, len(self._data))
-        self._window = low, low + len(piece), piece
+        self._window = low, low + len(piece), piece.data
         if low + len(piece) == len(self._data):
             piece = np.append(piece, np.zeros(8, np.uint8))
         candidates, known = None, (0, 0)
@@ -272,7 +275,7 @@ class _Walk:
             return self._leave(pos, stop)
         length, kind, number = self._header(pos)
         over = pos + HEADER + length
-        is_sound = _LEAST[kind] <= length <= _MOST[kind] and over <= stop
+        is_sound = _IS_LENGTH[kind][0] <= length <= _IS_LENGTH[kind][1] and over <= stop
         if kind == DATA and number not in self._declared:
             is_sound = False
             if self._mended(pos, number, over):
@@ -309,25 +312,39 @@ class _Walk:
     def _followed(self, pos: int) -> int:
         """How sure it is that a record begins at a byte: 0 not, 1 several can follow each other from there, 2 one with
         the id and length of a topic, or the end, is among them."""
+        row = self._chain_rows.get(pos)
+        if row is None or not (self._chain_end or len(self._chain_rows) - row >= _AHEAD):
+            self._chain_end, chain = self._follow(pos)
+            self._chain_rows = {byte: row for row, byte in enumerate(chain)}
+            row = 0
+            if not self._chain_end and len(chain) < _AHEAD:
+                return 0
+        return self._chain_end or 1
+
+    def _follow(self, pos: int) -> tuple[int, list[int]]:
+        """What is sure of the end of the records that follow each other from a byte, and where they begin: 2 and 1 as
+        `_followed`, 0 where no record follows the last of them or they are many."""
         stop = self._stops[0]
-        for _ in range(_AHEAD):
+        chain: list[int] = []
+        while len(chain) < _FAR_AHEAD:
             if pos == stop:
-                return 2
+                return 2, chain
             if pos > stop:
-                return 0
+                break
             if pos + HEADER > stop:
-                return 1
+                return 1, chain
             length, kind, number = self._header(pos)
-            if not _LEAST[kind] <= length <= _MOST[kind]:
-                return 0
+            if not _IS_LENGTH[kind][0] <= length <= _IS_LENGTH[kind][1]:
+                break
+            chain.append(pos)
             if kind == DATA and number in self._declared:
-                return 2
+                return 2, chain
             pos += HEADER + length
             if pos > stop:
-                return 1  # the last one is cut
+                return 1, chain  # the last one is cut
             if kind == SYNC and self._bytes(pos - 8, pos) == _SYNC_MAGIC:
-                return 2
-        return 1
+                return 2, chain
+        return 0, chain
 
     def _leave(self, low: int, high: int) -> int:
         """Bytes that are no record; answers where they end."""
