@@ -32,6 +32,8 @@ DEFINITION_BYTES = MEBIBYTE
 TOPIC_DEFINITIONS = 500
 """Different ones that are compiled for one reading; a robot publishes some 100 types."""
 
+ULOG_TOPICS = 4_096
+"""Subscriptions of a ULog; a vehicle logs some 200."""
 TEXT_MESSAGE_TYPES = 1_000
 """A DataFlash log numbers its types by one byte."""
 

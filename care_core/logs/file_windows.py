@@ -30,7 +30,7 @@ Stored = tuple[int, "np.dtype[Any]"]
 
 _BLOCK = 1 << 12
 """Bytes read at least: the headers of neighbouring records lie close together."""
-_WINDOW, _MOST_WINDOWS = 1 << 18, 8
+WINDOW, _MOST_WINDOWS = 1 << 18, 8
 """Bytes read at most for records that lie apart: they stay in the processor's cache while they are picked out. So many
 times more where several lists are looked for: of each, some hundreds of records at once."""
 
@@ -53,7 +53,7 @@ class FileBytes:
         self._path, self._stream = path, stream
         self._size = stream.seek(0, SEEK_END)
         self._at, self._end, self._block = 0, 0, b""
-        np.empty(_KEPT, np.uint8)  # freed at once
+        keep_freed()
 
     def __len__(self) -> int:
         return self._size
@@ -177,9 +177,9 @@ class FileArray:
     def pieces(self, more: int) -> Iterator[tuple[int, Bytes]]:
         """The whole file piece by piece: where each begins, and its bytes with so many of the next, which may be
         overwritten by the next."""
-        buffer = np.empty(_WINDOW + more if self._held is None else 0, dtype=np.uint8)
-        for low in range(0, self._size, _WINDOW):
-            high = min(low + _WINDOW + more, self._size)
+        buffer = np.empty(WINDOW + more if self._held is None else 0, dtype=np.uint8)
+        for low in range(0, self._size, WINDOW):
+            high = min(low + WINDOW + more, self._size)
             yield low, self._filled(buffer[: high - low], low) if self._held is None else self._held[low:high]
 
     def byte(self, place: int) -> int:
@@ -209,7 +209,7 @@ class FileArray:
     def parts(self, lows: Offsets, highs: Offsets) -> list[bytes]:
         """The stretches from `lows` to `highs`, which follow each other in the file."""
         found: list[bytes] = []
-        for first, last in _close(lows, _WINDOW):
+        for first, last in _close(lows, WINDOW):
             low = int(lows[first])
             text = self.between(low, int(highs[last - 1])).data
             bounds = zip((lows[first:last] - low).tolist(), (highs[first:last] - low).tolist(), strict=True)
@@ -219,7 +219,7 @@ class FileArray:
     def windows(self, places: Sequence[Offsets], size: int) -> Iterator[tuple[list[tuple[slice, Offsets]], Bytes]]:
         """A walk along lists of places: of each list the rows that lie in a window and where in it, and the window's
         bytes with `size` past the last place, zeros past the end of the file; they may be overwritten by the next."""
-        window = _WINDOW * min(len(places), _MOST_WINDOWS)
+        window = WINDOW * min(len(places), _MOST_WINDOWS)
         buffer = np.empty(window + size if self._held is None else 0, dtype=np.uint8)
         first = [0] * len(places)
         while ahead := [int(each[at]) for each, at in zip(places, first, strict=True) if at < len(each)]:
@@ -234,6 +234,11 @@ class FileArray:
                 piece = np.append(piece, np.zeros(high - there, dtype=np.uint8))
             yield near, piece
             first = last
+
+
+def keep_freed() -> None:
+    """Have what is freed from now on stay with the process: taking the pages of each large array anew is slow."""
+    np.empty(_KEPT, np.uint8)  # freed at once
 
 
 def give_back(size: int) -> None:

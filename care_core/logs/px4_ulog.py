@@ -1,91 +1,152 @@
-"""PX4 logs (.ulg), decoded by pyulog (extra `px4`).
+"""PX4 logs (.ulg): a header, declarations of topics, and a chain of records without checksums.
 
 Topics are channels; further instances of one are `TOPIC#1`, `TOPIC#2`. What the firmware said in words is the channel
-`logged_messages`. pyulog reads on after damage but does not say where it was, so the chain of records is walked here.
+`logged_messages`. Only what is asked for is decoded. Source: the ULog file format,
+docs.px4.io/main/en/dev_log/ulog_file_format.html.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timezone
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
-from care_core.extras import install_hint
-from care_core.files import open_regular
 from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
-from care_core.logs.clock import PAUSE_S, find_clock
+from care_core.logs.clock import BACK_S, PAUSE_S, STEP_S, find_clock
 from care_core.logs.damage import summarised
+from care_core.logs.file_windows import FileArray, Offsets, keep_freed
+from care_core.logs.ulog_formats import RecordField, Value, read_value
+from care_core.logs.ulog_records import (
+    DEFAULT,
+    DROPOUT,
+    INFO,
+    INFO_MULTIPLE,
+    MESSAGE_HEADER,
+    PARAMETER,
+    TAGGED_TEXT,
+    TEXT,
+    Other,
+    Topic,
+    UlogContents,
+    each_of,
+    read_contents,
+)
 from care_core.numbers import median
 from care_core.run import Damage, Setting
 
+Floats = NDArray[np.float64]
+
 MESSAGES = "logged_messages"
-_HEADER_BYTES = 16
-_RECORD_TYPES = frozenset(b"BFIMPQARDLCSO")
-_SYSTEM_DEFAULT, _SETUP_DEFAULT = 0, 1
+SOURCE = "PX4 parameters"
+LEVELS = ("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "NOTICE", "INFO", "DEBUG")
+"""Of logged strings, by the digit that they begin with, as the Linux kernel numbers them."""
+_SYSTEM_DEFAULT, _SETUP_DEFAULT = 1, 2
+"""Bits of a default's record: of the system, and of the airframe that is set up, which counts first."""
 _VEHICLE_TYPES = {1: "multicopter", 2: "fixed wing", 3: "rover", 4: "airship"}
 _GPS_TOPICS = ("vehicle_gps_position", "sensor_gps")
 _EARLIEST_S = datetime(2005, 1, 1, tzinfo=timezone.utc).timestamp()
+_LATEST_S = 1e10
+_SAMPLES = 64
+"""Rows of a GPS topic that are looked at first for one that knows the time."""
+_NEAR = 100
+"""Messages ahead of a place among which the latest tells its time: several tasks write into one log."""
+
+
+class _Messages(NamedTuple):
+    """The messages of a channel whose time can be: where each begins, and seconds of the log, both of shape (n,)."""
+
+    topic: Topic
+    places: Offsets
+    t: Floats
 
 
 class Px4Log:
-    """A PX4 log. Fields are pyulog's (`q[0]`); times are seconds from the first record of the log.
+    """A PX4 log. Fields are dotted paths with numbers (`q[0]`); times are seconds from the first record of the log.
 
     Raises:
-        LogError: pyulog is not installed, or the file cannot be read.
+        LogError: the file cannot be read, or holds no message.
     """
 
     format = formats.PX4_ULG
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        ulog = _parse(path, None)
-        tables = {_channel(data): data.data["timestamp"] for data in _stamped(ulog)}
-        if not tables:
+        keep_freed()
+        self._data = FileArray.open(path)
+        contents = read_contents(self._data)
+        topics = [(topic, places, stamps.astype(np.float64)) for topic, places, stamps in each_of(contents)]
+        if not topics:
             raise LogError("The log holds no message.", hint="It may have been cut off.", where=str(path))
-        self._first_us = _first_us(ulog, tables.values())
-        seconds = {name: self._seconds(stamps) for name, stamps in tables.items()}
-        kept = {name: t[_believable(t)] for name, t in seconds.items()}
-        self._channels = {name: t for name, t in kept.items() if len(t)}
-        self.duration_s = max((float(t[-1]) for t in self._channels.values()), default=0.0)
-        self._info = dict(ulog.msg_info_dict)
-        self._version = _version(ulog)
-        self._settings = self._history(ulog)
-        self._words = self._spoken(ulog)
-        lost = sum(len(t) for t in seconds.values()) - sum(len(t) for t in kept.values())
-        self.damage = (*self._damage(ulog), *([Damage(f"{lost} messages with an impossible time")] if lost else ()))
+        self._first_us = _first_us(contents.start_us, (stamps for _, _, stamps in topics))
+        self._channels: dict[str, _Messages] = {}
+        lost = 0
+        for topic, places, stamps in topics:
+            t = self._seconds(stamps)
+            kept = _believable(t)
+            lost += len(t) - int(np.count_nonzero(kept))
+            if kept.any():
+                own = _Messages(topic, places, t)
+                self._channels[topic.channel] = own if kept.all() else _rows(own, kept)
+        self.duration_s = max((float(one.t[-1]) for one in self._channels.values()), default=0.0)
+        self._read_others(contents, lost)
+
+    def _read_others(self, contents: UlogContents, lost: int) -> None:
+        """What the records say that are no messages of topics, and what is broken."""
+        times = _Times(contents, self._seconds, self.duration_s)
+        unread: list[Damage] = []
+        self._info = _keyed(contents.others, INFO, unread)
+        self._settings = self._history(contents, times, unread)
+        self._words = self._spoken(contents.others)
+        self._multiple = [one for one in contents.others if one.kind == INFO_MULTIPLE]
+        misfits = [Damage("a message fits no declaration", byte) for byte in contents.misfits]
+        broken = (
+            *summarised(contents.damage, "damaged places"),
+            *summarised(unread, "records that cannot be read"),
+            *summarised(misfits, "messages that fit no declaration"),
+        )
+        self.damage = (
+            *summarised(_dropouts(contents.others, times), "dropouts"),
+            *(_timed(one, times, len(self._data)) for one in sorted(broken, key=lambda one: one.byte or 0)),
+            *([Damage(f"{lost} messages with an impossible time")] if lost else ()),
+        )
 
     def channels(self) -> tuple[Channel, ...]:
         found = []
-        for name, t in (*self._channels.items(), (MESSAGES, self._words.t)):
+        for name, t in (*((name, one.t) for name, one in self._channels.items()), (MESSAGES, self._words.t)):
             if len(t):
                 found.append(Channel.over(name, name.partition("#")[0], len(t), float(t[-1] - t[0])))
         return tuple(sorted(found, key=lambda channel: channel.name))
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        topics = {name.partition("#")[0] for name in wanted if name in self._channels}
-        tables = {}
-        if topics:
-            for data in _stamped(_parse(self.path, sorted(topics))):
-                name = _channel(data)
-                if name in wanted and name in self._channels:
-                    t = self._seconds(data.data["timestamp"])
-                    with np.errstate(invalid="ignore"):  # flipped bits make signalling NaNs of floats
-                        columns = {field: data.data[field].astype(np.float64)
-                                   for field in wanted[name] if field in data.data}  # fmt: skip
-                    tables[name] = Table(t, columns).where(_believable(t))
+        tables = self._tables({name: (self._channels[name], fields) for name, fields in wanted.items()
+                               if name in self._channels})  # fmt: skip
         if MESSAGES in wanted and len(self._words):
             columns = {field: self._words[field] for field in wanted[MESSAGES] if field in self._words.columns}
             tables[MESSAGES] = Table(self._words.t, columns)
+        return tables
+
+    def _tables(self, wanted: Mapping[str, tuple[_Messages, Sequence[str]]]) -> dict[str, Table]:
+        """Fields of messages, all by one walk through the file."""
+        layouts = {name: _fields(own.topic, fields) for name, (own, fields) in wanted.items()}
+        with_fields = [name for name in wanted if layouts[name]]
+        stored = self._data.fields(
+            [(wanted[name][0].places, [(one.offset, one.dtype) for one in layouts[name].values()])
+             for name in with_fields]
+        )  # fmt: skip
+        columns = dict(zip(with_fields, stored, strict=True))
+        tables = {}
+        with np.errstate(invalid="ignore"):  # flipped bits make signalling NaNs of floats
+            for name, (own, _) in wanted.items():
+                values = (column.astype(np.float64) for column in columns.pop(name, ()))
+                tables[name] = Table(own.t, dict(zip(layouts[name], values, strict=True)))
         return tables
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
@@ -94,140 +155,180 @@ class Px4Log:
     @cached_property
     def facts(self) -> Mapping[str, str]:
         """`stack`, `firmware` ("PX4 v1.15.0 (cb09dde6)"), `uuid` of the board, `hardware` and `vehicle`, where told."""
-        facts = {"stack": "PX4", "firmware": f"PX4 {self._version}".strip()}
-        if isinstance(self._info.get("sys_uuid"), str):
-            facts["uuid"] = str(self._info["sys_uuid"])
-        if isinstance(self._info.get("ver_hw"), str):
-            facts["hardware"] = str(self._info["ver_hw"])
-        status = self.read({"vehicle_status": ("vehicle_type",)}).get("vehicle_status")
-        if status is not None and "vehicle_type" in status.columns and len(status):
-            kind = float(status["vehicle_type"][-1])
-            facts["vehicle"] = _VEHICLE_TYPES.get(int(kind), "") if math.isfinite(kind) else ""
+        facts = {"stack": "PX4", "firmware": f"PX4 {_version(self._info)}".strip()}
+        for fact, key in (("uuid", "sys_uuid"), ("hardware", "ver_hw")):
+            if isinstance(value := self._info.get(key), str):
+                facts[fact] = value
+        if (own := self._channels.get("vehicle_status")) is not None:
+            last = self._tables({"": (_rows(own, slice(-1, None)), ("vehicle_type",))})[""]
+            if "vehicle_type" in last.columns:
+                facts["vehicle"] = _VEHICLE_TYPES.get(int(last["vehicle_type"][-1]), "")
         return {key: text for key, text in facts.items() if text}
 
     @cached_property
     def start(self) -> str | None:
         """Wall clock of the first record (UTC), from the first GPS message that knows it."""
-        for table in self.read(dict.fromkeys(_GPS_TOPICS, ("time_utc_usec",))).values():
-            if "time_utc_usec" in table.columns:
-                utc_s = table["time_utc_usec"] / 1e6 - table.t
-                known = utc_s[(utc_s > _EARLIEST_S) & (utc_s < 1e10)]
-                if len(known):
-                    return datetime.fromtimestamp(float(known[0]), timezone.utc).isoformat(timespec="seconds")
+        for own in (self._channels[name] for name in _GPS_TOPICS if name in self._channels):
+            last = len(own.t) - 1
+            rows = np.unique(np.linspace(0, last, min(_SAMPLES, last + 1)).astype(np.int64))  # few bytes of a large log
+            if len(known := np.flatnonzero(np.isfinite(self._utc_s(own, rows)))):
+                first = int(known[0])
+                near = np.arange(rows[max(first - 1, 0)], rows[first] + 1)
+                utc_s = self._utc_s(own, near)
+                start_s = float(utc_s[np.isfinite(utc_s)][0])
+                return datetime.fromtimestamp(start_s, timezone.utc).isoformat(timespec="seconds")
         return None
 
-    def _seconds(self, stamps_us: NDArray[Any]) -> NDArray[np.float64]:
-        """Times in the log. What was said before it began and still held is stamped earlier, or 0: it gets time 0."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.maximum(stamps_us.astype(np.float64) - self._first_us, 0.0) / 1e6)
+    def _utc_s(self, own: _Messages, rows: NDArray[np.int64]) -> Floats:
+        """Wall clock of the first record by rows of a GPS topic, seconds since 1970; NaN of those that do not know."""
+        table = self._tables({"": (_rows(own, rows), ("time_utc_usec",))})[""]
+        if "time_utc_usec" not in table.columns:
+            return np.full(len(rows), np.nan)
+        utc_s = table["time_utc_usec"] / 1e6 - table.t
+        return np.where((utc_s > _EARLIEST_S) & (utc_s < _LATEST_S), utc_s, np.nan)
 
-    def _history(self, ulog: Any) -> dict[str, tuple[Setting, ...]]:
+    @property
+    def multiple(self) -> Mapping[str, tuple[tuple[Value, ...], ...]]:
+        """Information that comes in parts (`perf_counter_preflight`, `boot_console_output`): by key its lists."""
+        lists: dict[str, list[list[Value]]] = {}
+        for one in self._multiple:
+            if (keyed := read_value(one.body[1:])) is not None:
+                own = lists.setdefault(keyed[0], [])
+                if not own or not one.body[0]:
+                    own.append([])
+                own[-1].append(keyed[1])
+        return {key: tuple(tuple(parts) for parts in own) for key, own in lists.items()}
+
+    def _seconds(self, stamps_us: Floats) -> Floats:
+        """Times in the log. What was said before it began and still held is stamped earlier, or 0: it gets time 0."""
+        return np.maximum(stamps_us - self._first_us, 0.0) / 1e6
+
+    def _history(self, contents: UlogContents, times: _Times, unread: list[Damage]) -> dict[str, tuple[Setting, ...]]:
         """Every parameter with its default (the log names those that differ from the value) and its changes."""
-        defaults = {**ulog.get_default_parameters(_SYSTEM_DEFAULT), **ulog.get_default_parameters(_SETUP_DEFAULT)}
-        source = "PX4 parameters"
+        initial = [one for one in contents.others if one.byte < contents.logging_byte]
+        later = [one for one in contents.others if one.byte >= contents.logging_byte and one.kind == PARAMETER]
+        defaults = _defaults(contents.others, unread)
         known: dict[str, list[Setting]] = {}
-        for name, value in ulog.initial_parameters.items():
+        for name, value in _keyed(initial, PARAMETER, unread).items():
             if _is_number(value):
-                default = defaults.get(name, value) if ulog.has_default_parameters else None
-                known[name] = [Setting(name, _number(value), source, _number(default) if _is_number(default) else None)]
-        for stamp_us, name, value in ulog.changed_parameters:
-            values = known.setdefault(name, [])
-            if _is_number(value) and (not values or values[-1].value != _number(value)):
-                changed_s = (stamp_us - self._first_us) / 1e6 if values else None
-                values.append(Setting(name, _number(value), source, changed_at_s=changed_s))
+                default = defaults.get(name, value) if contents.has_defaults else None
+                known[name] = [Setting(name, _number(value), SOURCE, _number(default) if _is_number(default) else None)]
+        for one in later:
+            for name, value in _keyed([one], PARAMETER, unread).items():
+                values = known.setdefault(name, [])
+                if _is_number(value) and (not values or values[-1].value != _number(value)):
+                    values.append(Setting(name, _number(value), SOURCE,
+                                          changed_at_s=times.at(one.byte) if values else None))  # fmt: skip
         return {name: tuple(values) for name, values in known.items() if values}
 
-    def _spoken(self, ulog: Any) -> Table:
-        tagged = [one for several in ulog.logged_messages_tagged.values() for one in several]
-        said = sorted([*ulog.logged_messages, *tagged], key=lambda one: int(one.timestamp))
-        t = self._seconds(np.array([one.timestamp for one in said], dtype=np.float64))
-        levels = [one.log_level_str() for one in said]
-        columns = {"level": levels, "message": [str(one.message) for one in said]}
+    def _spoken(self, others: Iterable[Other]) -> Table:
+        said = []
+        for one in others:
+            at = {TEXT: 1, TAGGED_TEXT: 3}.get(one.kind, 0)
+            if at:
+                stamp_us = int.from_bytes(one.body[at : at + 8], "little")
+                level = one.body[0] - ord("0")
+                named = LEVELS[level] if 0 <= level < len(LEVELS) else "UNKNOWN"
+                said.append((stamp_us, one.kind, named, one.body[at + 8 :].decode("utf-8", "replace").rstrip("\0")))
+        said.sort(key=lambda one: one[:2])
+        t = self._seconds(np.array([one[0] for one in said], dtype=np.float64))
+        columns = {"level": [one[2] for one in said], "message": [one[3] for one in said]}
         words = Table(t, {name: np.array(texts, dtype=object) for name, texts in columns.items()})
         return words.where(t <= self.duration_s + 1.0)
 
-    def _damage(self, ulog: Any) -> tuple[Damage, ...]:
-        times = self._seconds(np.array([one.timestamp for one in ulog.dropouts]))
-        dropouts = [Damage(f"{one.duration} ms were not recorded (dropout)", None, t)
-                    for one, t in zip(ulog.dropouts, times.tolist(), strict=True) if one.duration > 0]  # fmt: skip
-        broken = _first_break(self.path, self.duration_s)
-        if broken is None and ulog.file_corruption:
-            broken = Damage("records that fit no declaration")
-        return (*summarised(dropouts, "dropouts"), *([broken] if broken else ()))
+
+class _Times:
+    """When records lie that have no stamp: the latest time of the messages just ahead of them."""
+
+    def __init__(self, contents: UlogContents, seconds: Any, duration_s: float) -> None:
+        self._places, self._stamps_us = contents.places, contents.stamps_us
+        self._seconds, self._end_s = seconds, duration_s
+
+    def at(self, byte: int) -> float:
+        """Seconds of the log at a byte; 0 ahead of all messages."""
+        row = int(np.searchsorted(self._places, self._places.dtype.type(byte)))
+        t = self._seconds(self._stamps_us[max(row - _NEAR, 0) : row].astype(np.float64))
+        return float(max(t[t <= self._end_s], default=0.0))
 
 
-def _parse(path: Path, topics: Sequence[str] | None) -> Any:
-    try:
-        from pyulog import ULog
-    except ImportError as err:
-        raise LogError(
-            "PX4 logs need pyulog, which is not installed.",
-            hint=f"{install_hint('px4')}.",
-            where=str(path),
-        ) from err
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            return ULog(str(path), topics)
-    except (FileNotFoundError, PermissionError) as err:
-        raise LogError(f"Cannot read the file: {err.strerror}.", hint="Check the path.", where=str(path)) from err
-    except Exception as err:  # pyulog says not which errors a damaged file can raise
-        raise LogError(
-            "The log is too damaged for pyulog.", hint="Copy it from the vehicle again.", where=str(path)
-        ) from err
+def _rows(own: _Messages, rows: slice | NDArray[Any]) -> _Messages:
+    return _Messages(own.topic, own.places[rows], own.t[rows])
 
 
-def _stamped(ulog: Any) -> list[Any]:
-    """The topics that say when; a flipped bit can rename the field."""
-    return [data for data in ulog.data_list if "timestamp" in data.data]
+def _fields(topic: Topic, names: Iterable[str]) -> dict[str, RecordField]:
+    """Where the fields that a topic has lie behind the first byte of a record."""
+    found = ((name, topic.layout.find(name)) for name in names)
+    return {name: RecordField(one.offset + MESSAGE_HEADER, one.dtype) for name, one in found if one is not None}
 
 
-def _channel(data: Any) -> str:
-    return f"{data.name}#{data.multi_id}" if data.multi_id else str(data.name)
+def _keyed(others: Iterable[Other], kind: int, unread: list[Damage]) -> dict[str, Value]:
+    """Keys and their last values of the records of a kind."""
+    found = {}
+    for one in others:
+        if one.kind == kind:
+            keyed = read_value(one.body)
+            if keyed is None:
+                unread.append(Damage("a record cannot be read", one.byte))
+            else:
+                found[keyed[0]] = keyed[1]
+    return found
 
 
-def _is_number(value: Any) -> TypeGuard[int | float]:
+def _defaults(others: Sequence[Other], unread: list[Damage]) -> dict[str, Value]:
+    """The defaults of parameters: the airframe's where it has one of its own, else the system's."""
+    system: dict[str, Value] = {}
+    setup: dict[str, Value] = {}
+    for one in others:
+        if one.kind == DEFAULT:
+            own = _keyed([Other(one.byte, DEFAULT, one.body[1:])], DEFAULT, unread)
+            for bit, defaults in ((_SYSTEM_DEFAULT, system), (_SETUP_DEFAULT, setup)):
+                if one.body[0] & bit:
+                    defaults.update(own)
+    return {**system, **setup}
+
+
+def _dropouts(others: Iterable[Other], times: _Times) -> list[Damage]:
+    found = ((int.from_bytes(one.body, "little"), one.byte) for one in others if one.kind == DROPOUT)
+    return [Damage(f"{ms} ms were not recorded (dropout)", None, times.at(byte)) for ms, byte in found if ms]
+
+
+def _timed(one: Damage, times: _Times, end: int) -> Damage:
+    """The damage with its time in the log."""
+    return one if one.byte is None else Damage(one.what, one.byte, times.at(one.byte))
+
+
+def _is_number(value: Value | None) -> bool:
     """Whether a parameter is one: a log may declare it as text, or as what no number is."""
     return isinstance(value, (int, float)) and math.isfinite(value)
 
 
-def _number(value: float) -> float:
+def _number(value: Value | None) -> float:
     """A parameter as it was typed: a float is single precision."""
+    assert isinstance(value, (int, float))
     return float(value) if isinstance(value, int) else float(str(np.float32(value)))
 
 
-def _first_us(ulog: Any, stamps: Iterable[NDArray[Any]]) -> float:
+def _first_us(start_us: int, stamps: Iterable[Floats]) -> float:
     """Second 0 of the log: its header's stamp, unless the records lie elsewhere."""
     middle = float(median([float(median(part)) for part in stamps]))
-    first = float(ulog.start_timestamp)
+    first = float(start_us)
     return first if 0 <= middle - first <= PAUSE_S * 1e6 else middle
 
 
-def _believable(t: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _believable(t: Floats) -> NDArray[np.bool_]:
     """Which times of a topic can be: within a day of the log's start, and in step with their neighbours."""
+    steps = np.diff(t)
+    if t[-1] <= PAUSE_S and (not len(steps) or (steps.min() >= -BACK_S and steps.max() <= STEP_S)):
+        return np.ones(len(t), bool)
     near = t <= PAUSE_S
     _, impossible, _ = find_clock(t[near], np.flatnonzero(near))
     near[np.flatnonzero(near)[impossible]] = False
     return np.asarray(near)
 
 
-def _first_break(path: Path, end_s: float) -> Damage | None:
-    """Where the chain of records breaks for the first time; a cut ends the log at `end_s`."""
-    with open_regular(path) as stream:
-        data = stream.read()
-    place, size = _HEADER_BYTES, len(data)
-    while place + 3 <= size:
-        length = data[place] | data[place + 1] << 8
-        if data[place + 2] not in _RECORD_TYPES or not length:
-            return Damage("what follows is no record", place)
-        if place + 3 + length > size:
-            break
-        place += 3 + length
-    return Damage(f"cut in a record, {size - place} bytes of it are there", place, end_s) if place < size else None
-
-
-def _version(ulog: Any) -> str:
-    try:
-        major, minor, patch, _ = ulog.get_version_info()
-        return f"v{major}.{minor}.{patch} ({str(ulog.msg_info_dict['ver_sw'])[:8]})"
-    except Exception:  # a flipped bit makes another type of it
+def _version(info: Mapping[str, Value]) -> str:
+    """ "v1.15.0 (cb09dde6)": one byte each of `ver_sw_release`, and the first digits of the commit."""
+    release, commit = info.get("ver_sw_release"), info.get("ver_sw")
+    if not isinstance(release, int) or not isinstance(commit, str):
         return ""
+    return f"v{release >> 24 & 255}.{release >> 16 & 255}.{release >> 8 & 255} ({commit[:8]})"

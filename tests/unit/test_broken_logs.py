@@ -103,7 +103,7 @@ def test_a_log_too_large_to_hold_is_the_same_in_windows(
     path = MAKERS[kind](tmp_path / "log")
     held = open_log(path)
     monkeypatch.setattr(limits, "HELD_BYTES", 0)
-    monkeypatch.setattr(file_windows, "_WINDOW", 1000)
+    monkeypatch.setattr(file_windows, "WINDOW", 1000)
     windowed = open_log(path)
     assert (windowed.channels(), windowed.settings(), windowed.damage) == (
         held.channels(), held.settings(), held.damage
