@@ -66,11 +66,8 @@ def _other_plugin(log: Log, schema: Schema) -> str:
 def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:
     """What the log says of its robot that is not what the profile was learned on."""
     for key, text in schema.match.items():
-        if (
-            key not in ("vehicle", "airframe")
-            and log.facts.get(key)
-            and text.casefold() not in log.facts[key].casefold()
-        ):
+        told = "" if key in ("vehicle", "airframe") else log.facts.get(key, "")
+        if told and text.casefold() not in told.casefold():
             yield f"the log's {key} is '{told}', the profile is for '{text}'"
     if schema.learned_elsewhere:
         yield schema.learned_elsewhere

@@ -55,10 +55,12 @@ class FlownMission(Record, eq=False):
     items: int | None
     """How many items the mission has, None where the log does not say."""
     corners: Floats
-    """Shape (legs + 1, 2): the way that was asked for, from home through the waypoints to where it ends."""
+    """Shape (legs + 1, 2): the way that was asked for, from home through the waypoints."""
     end: tuple[float, float] | None
     """Where the mission ends, None where it says neither to return nor to land, or broke off before it said so."""
     track: Track | None
+    legs: Phase | None
+    """From the start of the first leg to where the last one was flown, or broken off; None where none was begun."""
     phases: Mapping[tuple[str, int], Phase]
 
     @property
@@ -79,11 +81,11 @@ class FlownMission(Record, eq=False):
         return np.asarray(np.interp(t, self.track.t, self.track.height) > AIRBORNE_M)
 
     def path_errors(self) -> Floats:
-        """Horizontal distance in metres from the way that was asked for, in the air, along the track as flown."""
-        if self.track is None:
+        """Horizontal distance in metres from the legs while they were flown, along the track as flown."""
+        if self.track is None or self.legs is None:
             return np.empty(0)
         track = self.track.filled_in()
-        going = self.under_way(track.t)
+        going = self.under_way(track.t) & (track.t >= self.legs.start_s) & (track.t <= self.legs.end_s)
         return distance_to_legs(np.column_stack((track.north[going], track.east[going])), self.corners)
 
 
@@ -123,11 +125,12 @@ def analyse(mission: Mission) -> FlownMission:
     way = mission.shared(requested_mission)
     ending = "open" if isinstance(way, Unavailable) else way.ending
     corners = np.empty((0, 2)) if isinstance(way, Unavailable) else way.points[:, :2]
-    if ending == "return":
-        corners = np.vstack((corners, np.zeros(2)))
-    end = None if ending == "open" else (float(corners[-1, 0]), float(corners[-1, 1]))
+    end = None
+    if ending != "open":
+        end = (0.0, 0.0) if ending == "return" else (float(corners[-1, 0]), float(corners[-1, 1]))
     reached = _reached(mission)
     track = _track(mission)
+    phases = _phases(mission, items, places, reached, track)
     return FlownMission(
         places=places,
         reached=max(reached, default=-1),
@@ -135,7 +138,8 @@ def analyse(mission: Mission) -> FlownMission:
         corners=corners,
         end=end,
         track=track,
-        phases=_phases(mission, items, places, reached, track),
+        legs=_legs(mission, items, places, reached),
+        phases=phases,
     )
 
 
@@ -183,6 +187,17 @@ def _phases(
         home = phases_home(track, homeward_s, mission.end_s, slow, returns=returns)
         phases.update({(name, 0): phase for name, phase in home.items()})
     return phases
+
+
+def _legs(
+    mission: Mission, items: Mapping[int, Item], places: Mapping[int, Item], reached: Mapping[int, float]
+) -> Phase | None:
+    """The part of the flight that was spent on legs."""
+    if not places:
+        return None
+    homeward_s, _ = _homeward(mission, items)
+    end_s = min(homeward_s, reached.get(max(places), math.inf), mission.end_s)
+    return Phase(places[min(places)].begun_s, max(end_s, places[min(places)].begun_s))
 
 
 def _homeward(mission: Mission, items: Mapping[int, Item]) -> tuple[float, bool]:

@@ -130,7 +130,7 @@ def peak_height(mission: Mission, args: Args) -> Value:
     rests_on=position(EXTREME),
 )  # fmt: skip
 def path_error(mission: Mission, args: Args) -> Value:
-    """Horizontal distance from the legs (home, waypoints, home if it returns) in the air."""
+    """Horizontal distance from the legs (home, then the waypoints) while they were flown."""
     flown = flown_mission(mission)
     if isinstance(flown, Unavailable):
         return flown
