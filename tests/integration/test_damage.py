@@ -219,7 +219,6 @@ def test_no_damage_makes_a_failed_mission_good(tmp_path: Path) -> None:
 
 
 def test_a_px4_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
-    pytest.importorskip("pyulog", reason="the extra 'px4' is not installed")
     path = tmp_path / "flight.ulg"
     raw = write_ulog(path).read_bytes()
     cuts = [raw[:size] for size in np.linspace(0, len(raw) - 1, CUTS, dtype=int)]
