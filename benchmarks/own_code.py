@@ -4,7 +4,8 @@
 
 *speed*: opening a log and decoding what the fitting profile reads of it, by our reader and by the library, seconds of
 the processor in cold processes without starting Python and importing. The logs are those of `benchmarks.ingest` (a
-450 MB bag and MCAP, DataFlash of 100 MB) and a telemetry log of the bundled flight, repeated.
+450 MB bag and MCAP, DataFlash of 100 MB), a telemetry log of the bundled flight, repeated, and a PX4 log of
+`benchmarks.px4_logs`, of which the checks' messages are read and pyulog reads all.
 *damage*: logs cut anywhere or with some bits turned; the share of their messages that each finds.
 *processes*: many items, one of which ends the process that works on it; how many are answered.
 *triage*: the small triage without a thing that is there for its speed.
@@ -32,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.ingest import CASES, DECODE_BAG, DECODE_BIN, DECODE_MCAP, INSTALLED, SAMPLE, SELECT
+from benchmarks.px4_logs import OURS, THEIRS, write_flight
 from benchmarks.small_triage import COMMAND, cpu_s
 from care_core.application.case import choose
 from care_core.errors import CareError
@@ -46,6 +48,7 @@ DATA = Path(__file__).parents[1] / "tests" / "data"
 FLIGHT, DRIVE = DATA / "arducopter_good.BIN", DATA / "move_base_good.bag"
 REPEATS = 20
 TURNED_BITS = 20
+ULOG_BYTES, LARGE_ULOG_BYTES = 1_000_000, 48_000_000
 ITEMS, DEADLY = 20, 3
 DECODE_TLOG = """
 import sys, time
@@ -113,6 +116,12 @@ def speed(runs: int) -> None:
             ours, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
             size = path.stat().st_size / 1e6
             print(f"  {name:12s} {size:6.1f} MB: {ours:.2f} s, {library} {theirs:.2f} s: {theirs / ours:.1f} x")
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_flight(Path(folder) / "flight.ulg", LARGE_ULOG_BYTES)
+        pairs = [(seconds_of(OURS, "", str(path)), seconds_of(THEIRS, "", str(path))) for _ in range(runs + 1)][1:]
+        ours, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
+        size = path.stat().st_size / 1e6
+        print(f"  {path.name:12s} {size:6.1f} MB: {ours:.2f} s, pyulog {theirs:.2f} s: {theirs / ours:.1f} x")
 
 
 # --- damage
@@ -161,6 +170,19 @@ def by_sqlite(path: Path) -> Iterator[Any]:
         yield from base.execute("select topic_id, timestamp, data from messages")
 
 
+def by_pyulog(path: Path) -> Iterator[Any]:
+    """All messages at once: it gives all that it found, or none."""
+    from pyulog import ULog
+
+    ulog = ULog(str(path))
+    yield from (stamp for topic in ulog.data_list for stamp in topic.data["timestamp"])
+    yield from ulog.logged_messages
+
+
+def ulog_bytes(folder: Path) -> bytes:
+    return write_flight(folder / "sound.ulg", ULOG_BYTES).read_bytes()
+
+
 def tlog_bytes(folder: Path) -> bytes:
     return write_tlog(folder / "sound.tlog", FLIGHT, np.random.default_rng(0)).read_bytes()
 
@@ -175,6 +197,7 @@ def db3_bytes(folder: Path) -> bytes:
 FORMATS = (
     Format("flight.BIN", lambda _: FLIGHT.read_bytes(), "pymavlink", by_dfreader),
     Format("flight.tlog", tlog_bytes, "pymavlink", by_mavutil),
+    Format("flight.ulg", ulog_bytes, "pyulog", by_pyulog),
     Format("drive.bag", lambda _: DRIVE.read_bytes(), "rosbags", by_rosbags),
     Format("drive.mcap", lambda _: restamped.mcap(DRIVE, lambda time_ns: time_ns), "mcap", by_mcap),
     Format("drive.db3", db3_bytes, "sqlite3", by_sqlite),

@@ -103,6 +103,7 @@ BENCHMARKS = (
     ),
     Benchmark("fleet", "benchmarks.fleet", "peak grows by 15 % at most; 0.8 of a loop on one worker", "a plain loop"),
     Benchmark("ingest", "benchmarks.ingest", "0.8, 2, 0.8 s; 300 MB; 5 times faster", "pymavlink, rosbags, mcap"),
+    Benchmark("px4_logs", "benchmarks.px4_logs", "0.7 of the peer's time, 150 MB", "pyulog reading all of it"),
     Benchmark("small_triage", "benchmarks.small_triage", "0.4 s of processor", "importing numpy"),
     Benchmark(
         "big_files",

@@ -12,7 +12,6 @@ from care_core.starting import interpreter
 DISTRIBUTION = "care-tui"
 EXTRAS = {
     "learn": "train profiles, write Parquet",
-    "px4": "read PX4 logs (.ulg)",
     "mcp": "answer an assistant (care mcp)",
     "serve": "the app in a browser",
     "fleet": "triage many logs on several computers",

@@ -26,7 +26,6 @@ from benchmarks.tools.matrix import PYTHONS, ROOT
 MACHINES = ("x86_64", "aarch64")
 LIBCS = ("manylinux2014", "manylinux_2_17", "manylinux_2_24", "manylinux_2_26", "manylinux_2_27", "manylinux_2_28")
 """C libraries up to that of Ubuntu 20.04 and Debian 10, which later ones can take the place of."""
-EXTRAS = "px4"
 
 INSTALL = """\
 #!/bin/sh
@@ -51,7 +50,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--python", default=",".join(PYTHONS), help="versions of Python, with commas")
     parser.add_argument("--machine", default=",".join(MACHINES), help="machines, with commas")
-    parser.add_argument("--extras", default=EXTRAS, help="extras that are put in, with commas")
+    parser.add_argument("--extras", default="", help="extras that are put in, with commas")
     parser.add_argument("--out", type=Path, default=ROOT / "dist" / "offline")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)

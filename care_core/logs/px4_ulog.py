@@ -114,7 +114,7 @@ class Px4Log:
         )
         self.damage = (
             *summarised(_dropouts(contents.others, times), "dropouts"),
-            *(_timed(one, times, len(self._data)) for one in sorted(broken, key=lambda one: one.byte or 0)),
+            *(_timed(one, times) for one in sorted(broken, key=lambda one: one.byte or 0)),
             *([Damage(f"{lost} messages with an impossible time")] if lost else ()),
         )
 
@@ -292,7 +292,7 @@ def _dropouts(others: Iterable[Other], times: _Times) -> list[Damage]:
     return [Damage(f"{ms} ms were not recorded (dropout)", None, times.at(byte)) for ms, byte in found if ms]
 
 
-def _timed(one: Damage, times: _Times, end: int) -> Damage:
+def _timed(one: Damage, times: _Times) -> Damage:
     """The damage with its time in the log."""
     return one if one.byte is None else Damage(one.what, one.byte, times.at(one.byte))
 

@@ -248,10 +248,10 @@ class _Walk:
     def _run(found: _Candidates, at: int, low: int) -> int | None:
         """Take the messages that follow each other from a byte of the window on; answers where the last of them ends,
         None where none begins here."""
-        first = int(np.searchsorted(found.at, at))
+        first = int(found.at.searchsorted(at))
         if first == len(found.at) or found.at[first] != at:
             return None
-        last = int(found.breaks[np.searchsorted(found.breaks, first)])
+        last = int(found.breaks[found.breaks.searchsorted(first)])
         found.is_record[first : last + 1] = True
         return low + int(found.ends[last])
 

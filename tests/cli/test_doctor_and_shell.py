@@ -45,14 +45,14 @@ def test_what_is_broken_is_said_with_what_to_do(care: Care, tmp_path: Path, monk
     unsound = Path(os.environ["XDG_DATA_HOME"]) / "care" / "profiles" / "mine"
     unsound.mkdir(parents=True)
     (unsound / "profile.yaml").write_text("nonsense: 1\n", encoding="utf-8")
-    monkeypatch.setattr(checkup, "_is_installed", lambda name: name not in ("pyulog", "textual"))
+    monkeypatch.setattr(checkup, "_is_installed", lambda name: name not in ("mcp", "textual"))
     outcome = care("doctor", "--json")
     assert outcome.code == 1
     found = statuses(outcome.stdout)
     broken = {name for name, status in found.items() if status == "fail"}
     assert broken == {"history", "folder of settings", "profile mine", "packages"}
-    assert found["extra px4"] == "warn"
-    assert "pip install 'care-tui[px4]'" in outcome.stdout
+    assert found["extra mcp"] == "warn"
+    assert "pip install 'care-tui[mcp]'" in outcome.stdout
     assert all(check["do"] for check in json.loads(outcome.stdout)["checks"] if check["status"] == "fail")
 
 

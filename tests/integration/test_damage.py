@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import care_core
+from benchmarks.px4_logs import write_flight
 from care_core.application.case import Request
 from care_core.diagnose.judging import judge
 from care_core.diagnose.verdict import verdict_of
@@ -219,7 +220,6 @@ def test_no_damage_makes_a_failed_mission_good(tmp_path: Path) -> None:
 
 
 def test_a_px4_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
-    pytest.importorskip("pyulog", reason="the extra 'px4' is not installed")
     path = tmp_path / "flight.ulg"
     raw = write_ulog(path).read_bytes()
     cuts = [raw[:size] for size in np.linspace(0, len(raw) - 1, CUTS, dtype=int)]
@@ -231,6 +231,28 @@ def test_a_px4_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
         assert time.monotonic() - started < SECONDS
     assert counts[:CUTS] == sorted(counts[:CUTS])
     assert counts[CUTS - 1] >= 100
+
+
+def test_a_damaged_px4_flight_is_triaged_and_its_damage_named(tmp_path: Path) -> None:
+    path = write_flight(tmp_path / "flight.ulg", 300_000)
+    raw = path.read_bytes()
+    begin, whole = raw.index(b"D", raw.index(b"vehicle_land_detected", raw.rindex(b"TEST_"))), _messages(path)
+    for at, size in enumerate(np.linspace(begin + 1000, len(raw) - 1, CUTS, dtype=int).tolist()):
+        path.write_bytes(raw[:size])
+        assert _messages(path) == pytest.approx(whole * (size - begin) / (len(raw) - begin), rel=0.1, abs=20)
+        last = open_log(path).damage[-1:]
+        assert all(one.what.startswith("cut in a record") and one.byte is not None for one in last)
+        if at % EVERY == 0:
+            assert care_core.triage(Request(path)).diagnosis.run.log.damage == last
+    for at, damaged in enumerate(flipped(raw[begin:], FLIPS, 0)):
+        path.write_bytes(raw[:begin] + damaged)
+        assert _messages(path) >= whole - 2  # a length that is wrong and fits another record costs that one too
+        if at % EVERY == 0:
+            care_core.triage(Request(path))
+
+
+def _messages(path: Path) -> int:
+    return sum(channel.count for channel in open_log(path).channels())
 
 
 def _rows(path: Path) -> int:

@@ -22,8 +22,6 @@ LOGS = {
 @pytest.mark.parametrize("kind", LOGS)
 def test_any_recorded_log_makes_a_profile(care: Care, recorded: Path, tmp_path: Path, kind: str) -> None:
     name, mission = LOGS[kind]
-    if kind == "px4":
-        pytest.importorskip("pyulog")
     made = care("profiles", "new", recorded / name, "-o", tmp_path / "robot")
     assert made.code == 0, made.stderr
     assert mission in made.stdout

@@ -19,9 +19,9 @@ from care_core.extras import EXTRAS, install_command
 @pytest.mark.parametrize(
     ("mark", "expected"),
     [
-        ("uv-receipt.toml", f"uv pip install --python {sys.executable} 'care-tui[px4]'"),
-        ("pipx_metadata.json", "pipx runpip care-tui install 'care-tui[px4]'"),
-        ("", f"{sys.executable} -m pip install 'care-tui[px4]'"),
+        ("uv-receipt.toml", f"uv pip install --python {sys.executable} 'care-tui[mcp]'"),
+        ("pipx_metadata.json", "pipx runpip care-tui install 'care-tui[mcp]'"),
+        ("", f"{sys.executable} -m pip install 'care-tui[mcp]'"),
     ],
     ids=("uv", "pipx", "venv"),
 )
@@ -32,12 +32,12 @@ def test_an_extra_is_added_by_what_installed_the_program(
     monkeypatch.delenv("VIRTUAL_ENV", raising=False)
     if mark:
         (tmp_path / mark).touch()
-    assert install_command("px4") == expected
+    assert install_command("mcp") == expected
 
 
 def test_in_an_activated_environment_pip_is_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VIRTUAL_ENV", sys.prefix)
-    assert install_command("px4") == "pip install 'care-tui[px4]'"
+    assert install_command("mcp") == "pip install 'care-tui[mcp]'"
     assert install_command() == "pip install --force-reinstall care-tui"
 
 
@@ -78,8 +78,8 @@ def test_the_same_wheels_give_the_same_archive_and_the_page_of_the_program(tmp_p
     for path in other:
         os.utime(path, (1, 1))
         path.chmod(0o600)
-    made = packed(one, one[0], "px4", "3.12", "aarch64")
-    assert made == packed(other, other[0], "px4", "3.12", "aarch64")
+    made = packed(one, one[0], "mcp", "3.12", "aarch64")
+    assert made == packed(other, other[0], "mcp", "3.12", "aarch64")
     with tarfile.open(fileobj=io.BytesIO(made)) as archive:
         page = archive.extractfile("care_tui-0.1.0-python3.12-aarch64/README.md")
         assert page is not None

@@ -1,19 +1,17 @@
-"""PX4 logs: one written here, those from the wild against pyulog, and the way to have pyulog."""
+"""PX4 logs: one written here, and those from the wild against pyulog, topic by topic and word by word."""
 
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from care_core.errors import LogError
 from care_core.logs.opening import open_log
+from care_core.logs.px4_ulog import Px4Log
 from tests.rewritten import write_ulog
-
-pytest.importorskip("pyulog")
 
 
 def test_reads_topics_parameters_texts_and_dropouts(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -44,27 +42,71 @@ def test_a_cut_log_says_where(tmp_path: Path) -> None:
     assert log.damage[-1].time_s == pytest.approx(log.duration_s)
 
 
-def test_without_pyulog_the_error_says_how_to_have_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pyulog", None)
-    with pytest.raises(LogError, match="pyulog") as caught:
-        open_log(write_ulog(tmp_path / "a.ulg"))
-    assert "pip install 'care-tui[px4]'" in caught.value.hint
-
-
 SHARED = os.environ.get("CARE_SHARED")
+RECORDED = sorted(Path(SHARED).glob("logs*/*/*.ulg")) if SHARED else []
 
 
-@pytest.mark.skipif(SHARED is None, reason="CARE_SHARED names no folder of recorded logs")
-@pytest.mark.parametrize("name", ["px4_appended_multiple", "px4_events", "px4_small_20min"])
-def test_agrees_with_pyulog(name: str) -> None:
-    from pyulog import ULog
+def peer_of(path: Path) -> Any:
+    """The log as pyulog reads it."""
+    return pytest.importorskip("pyulog").ULog(str(path))
 
-    path = Path(SHARED or "", "logs", "px4_ulg", f"{name}.ulg")
-    log, peer = open_log(path), ULog(str(path))
-    names = {f"{one.name}#{one.multi_id}" if one.multi_id else one.name: one for one in peer.data_list}
-    tables = log.read({channel: tuple(data.data) for channel, data in names.items()})
-    assert set(tables) == set(names)
-    for channel, data in names.items():
-        for field, column in data.data.items():
-            np.testing.assert_array_equal(tables[channel][field], column.astype(float))
-    assert len(log.settings()) == len(peer.initial_parameters)
+
+def assert_agrees(path: Path) -> None:
+    """Every field of every topic, parameter, default, change, dropout, text and information is as pyulog reads it."""
+    log, peer = Px4Log(path), peer_of(path)
+    topics = {f"{one.name}#{one.multi_id}" if one.multi_id else one.name: one.data for one in peer.data_list}
+    tables = log.read({name: tuple(data) for name, data in topics.items()})
+    assert set(tables) == set(topics)
+    for name, data in topics.items():
+        assert set(tables[name].columns) == set(data)
+        for field, column in data.items():
+            np.testing.assert_array_equal(tables[name][field], column.astype(np.float64), f"{name}.{field}")
+    assert_same_parameters(log, peer)
+    said = [*peer.logged_messages, *(one for tagged in peer.logged_messages_tagged.values() for one in tagged)]
+    words = log.read({"logged_messages": ("level", "message")}).get("logged_messages")
+    assert sorted(zip(words["level"], words["message"], strict=True) if words else []) == sorted(
+        (one.log_level_str(), one.message) for one in said
+    )
+    dropouts = [one.duration for one in peer.dropouts if one.duration]
+    assert [int(one.what.split()[0]) for one in log.damage if "dropout" in one.what] == dropouts[: len(log.damage)]
+    assert {key: [list(parts) for parts in lists] for key, lists in log.multiple.items()} == {
+        key: [[as_read(part) for part in parts] for parts in lists]
+        for key, lists in peer.msg_info_multiple_dict.items()
+    }
+
+
+def as_read(value: Any) -> Any:
+    """What pyulog makes of information that is no text, as bytes."""
+    return bytes(value) if isinstance(value, (bytes, bytearray, list)) else value
+
+
+def assert_same_parameters(log: Px4Log, peer: Any) -> None:
+    settings = log.settings()
+    numbers = {name: value for name, value in peer.initial_parameters.items() if np.isfinite(value)}
+    assert {name: np.float32(values[0].value) for name, values in settings.items()} == {
+        name: np.float32(value) for name, value in numbers.items()
+    }
+    defaults = {**peer.get_default_parameters(0), **peer.get_default_parameters(1)}
+    for name, value in numbers.items():
+        default = settings[name][0].default
+        assert (default is None) == (not peer.has_default_parameters)
+        if default is not None:
+            assert np.float32(default) == np.float32(defaults.get(name, value))
+    last = numbers | {name: value for _, name, value in peer.changed_parameters}
+    assert {name: np.float32(values[-1].value) for name, values in settings.items()} == {
+        name: np.float32(value) for name, value in last.items()
+    }
+    changed_at_s = {name: (stamp - peer.start_timestamp) / 1e6 for stamp, name, _ in peer.changed_parameters}
+    for name, values in settings.items():
+        if len(values) == 2:
+            assert values[1].changed_at_s == pytest.approx(changed_at_s[name], abs=0.1)
+
+
+def test_agrees_with_pyulog_on_a_written_log(tmp_path: Path) -> None:
+    assert_agrees(write_ulog(tmp_path / "a.ulg"))
+
+
+@pytest.mark.skipif(not RECORDED, reason="CARE_SHARED names no folder of recorded logs")
+@pytest.mark.parametrize("path", RECORDED, ids=lambda path: path.stem)
+def test_agrees_with_pyulog(path: Path) -> None:
+    assert_agrees(path)
