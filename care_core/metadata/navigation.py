@@ -70,11 +70,16 @@ def known(ros: Ros, owner: str, name: str) -> tuple[Fact, ...]:
 
 def distributions(fact: Fact, ros: Ros) -> frozenset[str]:
     """The distributions in which a fact holds."""
+    return spanned(fact.releases, ros)
+
+
+def spanned(releases: str, ros: Ros) -> frozenset[str]:
+    """The distributions of a text such as `foxy humble-jazzy`; all of them where it is empty."""
     order = DISTRIBUTIONS[ros]
-    if not fact.releases:
+    if not releases:
         return frozenset(order)
     found: set[str] = set()
-    for span in fact.releases.split():
+    for span in releases.split():
         first, _, last = span.partition("-")
         found |= set(order[order.index(first) : order.index(last or first) + 1])
     return frozenset(found)
