@@ -94,14 +94,32 @@ def find_options(logs: Sequence[InputLog], known: Mapping[str, Variable], taken:
             found.leave(driven.name, reason)
         else:
             chosen.append((driven, fact))
+    chosen, sets = _together(chosen, known)
     names = _short_names([driven.name for driven, _ in chosen], known, set(taken))
     for driven, fact in chosen:
-        option = _option(names[driven.name], driven, stack, fact, known.get(driven.name))
+        option = _option(names[driven.name], driven, stack, fact, known.get(driven.name), sets.get(driven.name, ()))
         if option is None:
             found.leave(driven.name, "they are 0 and nothing says how large they may be")
         else:
             found.chosen.append(option)
     return found
+
+
+def _together(
+    chosen: Sequence[tuple[_Driven, Fact | None]], known: Mapping[str, Variable]
+) -> tuple[list[tuple[_Driven, Fact | None]], dict[str, tuple[str, ...]]]:
+    """What a bundled profile sets as one, where it was driven as one: the first of each, and all that this one sets."""
+    by_name = {driven.name: driven for driven, _ in chosen}
+    sets: dict[str, tuple[str, ...]] = {}
+    for name, driven in by_name.items():
+        option = known.get(name)
+        own = () if option is None else tuple(one for one in option.parameters if known.get(one) is option)
+        if len(own) > 1 and own[0] == name:
+            alike = [one for one in own if one in by_name and by_name[one].last == driven.last]
+            if len(alike) > 1:
+                sets[name] = tuple(alike)
+    others = {other for name, several in sets.items() for other in several if other != name}
+    return [(driven, fact) for driven, fact in chosen if driven.name not in others], sets
 
 
 def _all_driven(logs: Sequence[InputLog]) -> list[_Driven]:
@@ -160,7 +178,9 @@ def _ends_alike(other: str, parts: Sequence[str]) -> bool:
     return own[-len(parts) :] == list(parts)
 
 
-def _option(name: str, driven: _Driven, stack: str, fact: Fact | None, known: Variable | None) -> Option | None:
+def _option(
+    name: str, driven: _Driven, stack: str, fact: Fact | None, known: Variable | None, sets: tuple[str, ...]
+) -> Option | None:
     kind, labels, type_from = _type(driven, stack, fact, known)
     reference, reference_from = _reference(driven, stack, known)
     bounds = (0.0, 1.0), "yes or no"
@@ -182,7 +202,7 @@ def _option(name: str, driven: _Driven, stack: str, fact: Fact | None, known: Va
         range=(low, high),
         default=reference,
         labels=labels,
-        parameters=(driven.name,),
+        parameters=sets or (driven.name,),
         safety=SAFETY.match(driven.name) is not None,
     )
     said = [f"range: {range_from}", f"default: {reference_from}", f"type: {type_from}", _driven_as(driven)]
