@@ -37,6 +37,12 @@ DWB, MPPI = "dwb_core::DWBLocalPlanner", "nav2_mppi_controller::MPPIController"
 RPP = "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"
 
 
+def test_a_class_in_braces_needs_no_quotes(tmp_path: Path) -> None:
+    line = "GridBased: {plugin: nav2_navfn_planner::NavfnPlanner, use_astar: no, tolerance: 0.5}"
+    assert told(tmp_path, node("planner_server", "planner_plugins: [GridBased]", line)) == []
+    assert told(tmp_path, "a: {b: c::d\n")[0][:2] == ("syntax", "error")
+
+
 @pytest.mark.parametrize("word", ["no", "No", "NO", "off", "Off", "n", "N", "false", "yes", "On", "y", "Y", "TRUE"])
 def test_the_words_that_rcl_takes_for_a_switch_are_one(tmp_path: Path, word: str) -> None:
     planner = node("planner_server", "planner_plugins: [GridBased]", "GridBased:",
