@@ -67,9 +67,12 @@ def _elsewhere(file: ConfigFile, entry: Entry, name: str, releases: frozenset[st
     if now:
         text = f"{name} is {now} in {distribution}, which does not know the other spelling."
         return problem_at("plugin-name", Severity.ERROR, file, entry, text, f"Write {now}.", plugins.SOURCE)
-    text = f"{name} is a plugin of {_span(releases)}, not of {distribution}."
+    text = f"{name} is a plugin of {_span(releases)}, not of {distribution}"
+    is_asked = plugins.is_loaded_in(name, distribution)
+    text += "." if is_asked else ", which loads none of its kind."
+    severity = Severity.ERROR if is_asked else Severity.WARNING
     hint = "Is the file for this distribution?"
-    return problem_at("plugin-name", Severity.ERROR, file, entry, text, hint, plugins.SOURCE)
+    return problem_at("plugin-name", severity, file, entry, text, hint, plugins.SOURCE)
 
 
 def _beside(file: ConfigFile, known: list[tuple[Entry, frozenset[str]]]) -> Iterator[Problem]:

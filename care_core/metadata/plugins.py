@@ -21,6 +21,12 @@ def releases_of(name: str) -> frozenset[str]:
     return _releases().get(name, frozenset())
 
 
+def is_loaded_in(name: str, distribution: str) -> bool:
+    """Whether a distribution loads any plugin of that kind."""
+    kinds = {base for base, known, _ in _table() if known == name}
+    return any(base in kinds and distribution in releases_of(known) for base, known, _ in _table())
+
+
 def spellings(name: str) -> Mapping[str, frozenset[str]]:
     """The names of the same class that some distribution knows, whatever separates package and class."""
     parts = _SEPARATOR.split(name)

@@ -206,6 +206,14 @@ def test_plugins_have_the_name_of_their_release(tmp_path: Path, plugin: str, tar
     )
 
 
+def test_a_plugin_of_a_kind_that_the_release_does_not_load_stops_no_node(tmp_path: Path) -> None:
+    text = node("bt_navigator", "navigators: [to_pose]", "to_pose:",
+                "  plugin: nav2_bt_navigator/NavigateToPoseNavigator")  # fmt: skip
+    assert told(tmp_path, text, "iron") == []
+    assert ("plugin-name", "warning", "plugin") in told(tmp_path, text, "humble")
+    assert ("plugin-name", "error", "plugin") in told(tmp_path, text, "jazzy")
+
+
 @pytest.mark.parametrize(
     ("plugin", "hint"),
     [
