@@ -57,7 +57,8 @@ EXCLUDED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "ros2": {
         _ROBOT: ("width", "height", "origin_*", "robot_radius", "footprint", "use_sim_time", "robot_base*",
                  "initial_pose.*", "set_initial_pose", "always_reset_initial_pose", "first_map_only",
-                 "rolling_window", "unknown_cost_value", "*.marking", "*.clearing", "*.inf_is_valid"),
+                 "rolling_window", "unknown_cost_value", "external_detection_*", "*.marking", "*.clearing",
+                 "*.inf_is_valid"),
         "how its messages are sent": (
             "qos_overrides.*", "bond_*", "*service_introspection*", "introspection_mode", "action_introspection*",
             "start_type_description*", "enable_stamped_cmd_vel", "map_subscribe_transient_local",
@@ -77,6 +78,7 @@ EXCLUDED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 }  # fmt: skip
 """Reason -> names: of a vehicle's parameter the whole name, of a node's what follows the node."""
 
+_SIMULATED = "loopback_simulator"
 _HELPER = "_rclcpp_node"
 """How Nav2 calls nodes beside its servers: they are given the file of their server, and read next to nothing of it."""
 
@@ -96,6 +98,8 @@ def reason_to_exclude(stack: str, parameter: str) -> str:
         node, dot, own = parameter.partition(".")
         if node.endswith(_HELPER):
             return "a helper node of another, whose own copy counts"
+        if node.rpartition("/")[2] == _SIMULATED:
+            return "the simulated world"
         name = (own if dot else node).lstrip("/")
     spellings = {name, name.rpartition(".")[2]}
     for reason, patterns in EXCLUDED.get(stack, {}).items():

@@ -8,8 +8,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from care_core.configs.driven import same_value
+from care_core.lint.scopes import as_file, scoped
 from care_core.metadata.fact import Fact
-from care_core.metadata.navigation import fact_of, is_ros
+from care_core.metadata.navigation import Ros, fact_of, is_ros
+from care_core.metadata.navigation import known as known_facts
 from care_core.records import Record, Struct, field
 from care_core.run import Setting
 from care_core.scaffold.excluded import SAFETY, reason_to_exclude
@@ -87,8 +89,10 @@ def find_options(logs: Sequence[InputLog], known: Mapping[str, Variable], taken:
     stack = logs[0].stack
     found = Options()
     chosen: list[tuple[_Driven, Fact | None]] = []
+    read = _read_by_whom(logs) if is_ros(stack) else {}
     for driven in _all_driven(logs):
-        fact = fact_of(stack, driven.name) if is_ros(stack) else None
+        facts = read.get(driven.name)
+        fact = _fact_of(driven, facts) if facts else fact_of(stack, driven.name) if is_ros(stack) else None
         reason = _reason_to_exclude(stack, driven, len(logs), fact, known)
         if reason:
             found.leave(driven.name, reason)
@@ -103,6 +107,30 @@ def find_options(logs: Sequence[InputLog], known: Mapping[str, Variable], taken:
         else:
             found.chosen.append(option)
     return found
+
+
+def _read_by_whom(logs: Sequence[InputLog]) -> dict[str, tuple[Fact, ...]]:
+    """What the table says of each parameter by the plugin that reads it, which the parameters themselves name."""
+    settings = {name: history[-1] for log in logs for name, history in log.settings.items() if history}
+    ros: Ros = "ros2" if logs[0].stack == "ros2" else "ros1"
+    file = as_file(settings, logs[0].path, is_ros2=ros == "ros2")
+    names = {id(entry): name for name, entry in zip(settings, file.entries, strict=True)}
+    return {
+        names[id(place.entry)]: tuple(fact for owner in place.owners for fact in known_facts(ros, owner, place.name))
+        for place in scoped(file).places
+        if place.owners
+    }
+
+
+def _fact_of(driven: _Driven, facts: Sequence[Fact]) -> Fact:
+    """Of what the releases say that whose default was driven, else the newest."""
+    usual = driven.usual[0] if any(number(value) is not None for value in driven.last) else None
+    alike = (one for one in facts if usual is not None and _same(one.default_number, usual))
+    return next(alike, facts[-1])
+
+
+def _same(default: float | None, value: float) -> bool:
+    return default is not None and same_value(default, value)
 
 
 def _together(

@@ -160,6 +160,19 @@ def test_the_table_knows_a_parameter_by_its_owner() -> None:
     assert fact_of("ros1", "/stranger/sim_time") is None
 
 
+def test_a_parameter_of_a_plugin_is_told_by_the_class_that_reads_it() -> None:
+    follow = "/controller_server.FollowPath"
+    mppi = {
+        f"{follow}.plugin": "nav2_mppi_controller::MPPIController", f"{follow}.critics": "[ConstraintCritic]",
+        f"{follow}.ConstraintCritic.cost_weight": 4.0, f"{follow}.time_steps": 56, f"{follow}.batch_size": 2000,
+    }  # fmt: skip
+    found = options(seen(mppi, ros="2"))
+    assert [one.variable.name for one in found.chosen] == ["batch_size"]
+    assert found.left["at their default in every log"] == [
+        f"{follow}.ConstraintCritic.cost_weight", f"{follow}.time_steps"
+    ]  # fmt: skip
+
+
 def test_a_robot_of_no_known_kind_gets_signals_and_the_whole_recording(tmp_path: Path) -> None:
     made = scaffold([recorded_speed(tmp_path / "a.mcap", "gain")], "mine", [])
     assert made.schema.mission == {"kind": "recording"}
