@@ -298,6 +298,12 @@ def test_what_nav2_ships_and_nothing_reads_is_told_once_it_is_changed(tmp_path: 
     assert told(tmp_path, costmap(*spare)) == [("not-loaded", "note", "plugin")]
 
 
+@pytest.mark.parametrize("target", ["", "lyrical", "rolling"])
+def test_the_file_that_nav2_brings_has_no_finding(recorded: Path, target: str) -> None:
+    (linted,) = lint([str(recorded / "logs" / "configs" / "nav2" / "nav2_bringup_nav2_params.yaml")], target)
+    assert linted.problems == ()
+
+
 def test_every_plugin_of_the_table_is_of_a_release_and_spelled_one_way_in_it() -> None:
     for name in plugins.names():
         assert plugins.releases_of(name)
