@@ -206,7 +206,9 @@ def _other_distribution(
     if not is_told or not _is_covered(result, place.owners[0], likely):
         return None
     known = frozenset(name for fact in facts for name in navigation.distributions(fact, result.ros))
-    text = f"{place.owners[0]} reads {place.name} in {_span(known, order)}, not in {next(iter(likely))}."
+    text = (
+        f"{place.owners[0]} reads {place.name} in {navigation.spans(known, result.ros)}, not in {next(iter(likely))}."
+    )
     return problem_at(
         "unknown-key", severity, file, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
     )
@@ -218,11 +220,6 @@ def _is_covered(result: Scoped, owner: str, likely: frozenset[str]) -> bool:
         fact for name in navigation.keys_of(result.ros, owner) for fact in navigation.known(result.ros, owner, name)
     )
     return any(fact.owner == owner and navigation.distributions(fact, result.ros) & likely for fact in facts)
-
-
-def _span(names: frozenset[str], order: Sequence[str]) -> str:
-    held = [name for name in order if name in names]
-    return ", ".join(held) if len(held) < 3 else f"{held[0]} to {held[-1]}"
 
 
 def _dead(result: Scoped, place: Place) -> tuple[str, str] | None:

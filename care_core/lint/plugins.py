@@ -11,6 +11,7 @@ from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.scopes import Keys, class_of, split, words_of
 from care_core.metadata import plugins
+from care_core.metadata.navigation import spans
 
 _NAMING = ("plugin", "primary_controller")
 """Keys whose value is the name of a plugin."""
@@ -67,7 +68,7 @@ def _elsewhere(file: ConfigFile, entry: Entry, name: str, releases: frozenset[st
     if now:
         text = f"{name} is {now} in {distribution}, which does not know the other spelling."
         return problem_at("plugin-name", Severity.ERROR, file, entry, text, f"Write {now}.", plugins.SOURCE)
-    text = f"{name} is a plugin of {_span(releases)}, not of {distribution}"
+    text = f"{name} is a plugin of {spans(releases, 'ros2')}, not of {distribution}"
     is_asked = plugins.is_loaded_in(name, distribution)
     text += "." if is_asked else ", which loads none of its kind."
     severity = Severity.ERROR if is_asked else Severity.WARNING
@@ -87,15 +88,11 @@ def _beside(file: ConfigFile, known: list[tuple[Entry, frozenset[str]]]) -> Iter
             continue
         name = str(entry.value)
         now = [one for one, held in plugins.spellings(name).items() if held & usual]
-        text = f"{name} is loaded in {_span(releases)}, and the other plugins of this file in {_span(usual)}."
+        own, other = spans(releases, "ros2"), spans(usual, "ros2")
+        text = f"{name} is loaded in {own}, and the other plugins of this file in {other}."
         hint = f"Write {now[0]}." if now else "No release loads all of them."
         others = tuple(one.name for one, held in known if not held & releases)
         yield problem_at("plugin-name", Severity.WARNING, file, entry, text, hint, plugins.SOURCE, others)
-
-
-def _span(releases: frozenset[str]) -> str:
-    names = plugins.ordered(releases)
-    return " and ".join(names) if len(names) < 3 else f"{names[0]} to {names[-1]}"
 
 
 # Critics

@@ -85,6 +85,18 @@ def spanned(releases: str, ros: Ros) -> frozenset[str]:
     return frozenset(found)
 
 
+def spans(names: Collection[str], ros: Ros) -> str:
+    """Distributions in words: `foxy, humble to jazzy`."""
+    order = DISTRIBUTIONS[ros]
+    runs: list[list[str]] = []
+    for place, name in enumerate(order):
+        if name in names:
+            if not runs or order[place - 1] not in names:
+                runs.append([])
+            runs[-1].append(name)
+    return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
+
+
 def fact_of(ros: Ros, parameter: str, distribution: str = "", owner: str = "") -> Fact | None:
     """What the table says of a parameter (`/move_base/DWAPlannerROS/sim_time`, `/controller_server.FollowPath.vx_max`).
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from pathlib import Path
 
 from care_core.files import read_small_text
-from care_core.metadata.navigation import DISTRIBUTIONS, spanned
+from care_core.metadata.navigation import spanned
 
 SOURCE = "the plugin description files of ros-navigation/navigation2, foxy to rolling"
 DWB_CRITICS, MPPI_CRITICS = "dwb_core::TrajectoryCritic", "mppi::critics::CriticFunction"
@@ -53,11 +53,6 @@ def packages() -> frozenset[str]:
 def classes(base: str) -> frozenset[str]:
     """The plugins of a kind, in any distribution, without their package."""
     return frozenset(_SEPARATOR.split(name)[-1] for kind, name, _ in _table() if kind == base)
-
-
-def ordered(releases: Iterable[str]) -> list[str]:
-    """Distributions in order of time."""
-    return sorted(releases, key=DISTRIBUTIONS["ros2"].index)
 
 
 @cache

@@ -304,6 +304,14 @@ def test_the_file_that_nav2_brings_has_no_finding(recorded: Path, target: str) -
     assert linted.problems == ()
 
 
+def test_distributions_with_a_gap_are_told_with_it(tmp_path: Path) -> None:
+    (found,) = findings(tmp_path, controller("nav2_graceful_controller::GracefulController"), "iron")
+    assert (
+        found.text
+        == "nav2_graceful_controller::GracefulController is a plugin of humble, jazzy to rolling, not of iron."
+    )
+
+
 def test_every_plugin_of_the_table_is_of_a_release_and_spelled_one_way_in_it() -> None:
     for name in plugins.names():
         assert plugins.releases_of(name)
