@@ -12,6 +12,7 @@ from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, ScalarEvent
 from ruamel.yaml.nodes import Node, ScalarNode
+from ruamel.yaml.scanner import ScannerError
 
 from care_core import limits
 
@@ -21,6 +22,10 @@ _LONG_TEXT = 1000
 """Characters that count as one value more."""
 _WIDTH = 120
 """Columns of a text that is written."""
+
+
+_COLON = "found unexpected ':'"
+"""What the parser in C has against `{a: b::c}`, a class of C++ without quotes; those of ROS and of Python read it."""
 
 
 class PlainYamlError(ValueError):
@@ -73,9 +78,18 @@ def _round_trip() -> YAML:
 def compose(text: str) -> Node | None:
     """The tree of a text, whose nodes know their lines; None where it is empty. Raises PlainYamlError."""
     with _explained():
-        _check(text)
-        tree: Node | None = YAML(typ="safe").compose(text)
-        return tree
+        try:
+            return _composed(text)
+        except ScannerError as err:
+            if err.problem != _COLON:
+                raise
+            return _composed(text, pure=True)
+
+
+def _composed(text: str, *, pure: bool = False) -> Node | None:
+    _check(text, pure=pure)
+    tree: Node | None = YAML(typ="safe", pure=pure).compose(text)
+    return tree
 
 
 @contextmanager
@@ -89,7 +103,7 @@ def _explained() -> Iterator[None]:
         raise _explanation(err) from err
 
 
-def _check(text: str) -> None:
+def _check(text: str, *, pure: bool = False) -> None:
     """Refuse what is nested too deeply, or too large once its aliases are followed: both end the process when built."""
     if len(text) > limits.YAML_BYTES:
         raise PlainYamlError(f"it is larger than {limits.megabytes(limits.YAML_BYTES)}")
@@ -99,7 +113,7 @@ def _check(text: str) -> None:
     sizes: dict[str, int] = {}
     opened: list[tuple[str | None, int]] = []
     count = 0
-    for event in YAML(typ="safe").parse(text):
+    for event in YAML(typ="safe", pure=pure).parse(text):
         if isinstance(event, CollectionStartEvent):
             opened.append((event.anchor, count))
             count += 1

@@ -13,15 +13,13 @@ from pathlib import Path
 
 from care_core.configs.driven import as_number, same_value
 from care_core.configs.loading import ConfigFile as NamedFile
-from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.findings import Finding, Health, every_finding
-from care_core.ecosystems.ros.dialect import ROS1_YAML, ROS2_YAML
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint import navigation
 from care_core.lint.linting import lint
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.scopes import Place, Scoped, scoped
+from care_core.lint.problems import Problem, Severity
+from care_core.lint.scopes import Place, Scoped, as_file, scoped
 from care_core.metadata.navigation import known
 from care_core.records import replace
 from care_core.run import Setting
@@ -151,7 +149,7 @@ def _distance(value: float | str, default: float | str | None) -> float:
 
 def _problems(drive: Drive, files: Iterable[NamedFile]) -> Iterator[tuple[Problem, Scoped]]:
     """Problems of the values as driven, then of how the files are written, for nodes that were running."""
-    file = _as_file(drive)
+    file = as_file(drive.parameters, Path(drive.log.path), is_ros2=drive.facts.get("ros") == "2")
     result = scoped(file)
     for problem in navigation.values(file, result):
         yield problem, result
@@ -165,27 +163,6 @@ def _problems(drive: Drive, files: Iterable[NamedFile]) -> Iterator[tuple[Proble
                 is_meant = problem.rule in _OF_FILES and problem.severity is not Severity.NOTE
                 if is_meant and _ran(problem.parameter, nodes):
                     yield problem, held
-
-
-def _as_file(drive: Drive) -> ConfigFile:
-    """The parameters of a run as a file of them; a value of the log has no line."""
-    is_ros2 = drive.facts.get("ros") == "2"
-    format: Dialect = ROS2_YAML if is_ros2 else ROS1_YAML
-    entries = []
-    for name, one in drive.parameters.items():
-        node, _, path = name.partition(".")
-        keys = tuple(part for part in (node if is_ros2 else name).split("/") if part)
-        if is_ros2:
-            keys = (*keys, PARAMETERS, *path.split("."))
-        line = one.source.rpartition(":")[2]
-        entries.append(Entry(keys, one.value, int(line) if line.isdigit() else 0, 1, _kind(one.value)))
-    return ConfigFile(Path(drive.log.path), format, "", tuple(entries))
-
-
-def _kind(value: float | str) -> str:
-    if isinstance(value, str):
-        return "bool" if value in ("true", "false") else "list" if value.startswith("[") else "str"
-    return "int" if isinstance(value, int) else "float"
 
 
 def _path(name: str) -> tuple[str, ...]:

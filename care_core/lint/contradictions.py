@@ -59,6 +59,8 @@ ROS_PAIRS: tuple[Pair, ...] = (
     Pair("min_in_place_vel_theta", "max_vel_theta", "no turn in place is allowed", _LIMITS),
     Pair("min_rot_vel", "max_rot_vel", "", _LIMITS),
     Pair("min_speed_xy", "max_speed_xy", "", _LIMITS),
+    Pair("max_vel_x", "max_speed_xy", "the speed forwards never reaches its limit",
+         "dwb_plugins, kinematic_parameters.cpp: faster than max_speed_xy is no valid speed", True),
     Pair("vx_min", "vx_max", "", _LIMITS),
     Pair("ax_min", "ax_max", "", _LIMITS),
     Pair("min_particles", "max_particles", "", "amcl keeps their number between them"),
@@ -99,6 +101,12 @@ def inscribed_radius(footprint: Entry | None, radius: Entry | None) -> float | N
             ends = zip(points, [*points[1:], points[0]], strict=True)
             return min(_distance_to(*one, *other) for one, other in ends)
     return None if radius is None else radius.number
+
+
+def reach(footprint: Entry) -> float | None:
+    """How far the farthest corner of a footprint is from the robot's centre, m."""
+    points = _points(footprint.value) if isinstance(footprint.value, str) else []
+    return max((math.hypot(x, y) for x, y in points), default=None)
 
 
 def _points(text: str) -> list[tuple[float, float]]:

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 
 from care_core.errors import UsageError, nearest
-from care_core.lint import contradictions, workable
+from care_core.lint import contradictions, plugins, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.rules import MEANT, ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED
-from care_core.lint.scopes import COSTMAP, Place, Scoped, costmaps, scoped, split
+from care_core.lint.rules import LEFTOVERS, MEANT, ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED, Leftover
+from care_core.lint.scopes import COSTMAP, Place, Scoped, class_of, costmaps, scoped, split
 from care_core.metadata import navigation
 from care_core.metadata.fact import Fact
 from care_core.metadata.navigation import DISTRIBUTIONS, STACKS
@@ -29,6 +29,8 @@ _COPIED = {
     "InflationLayer": ("cost_scaling_factor", "inflation_radius"),
 }
 """What a costmap hands on to a layer of that class from its own namespace (copyParentParameters)."""
+_SHAPE = "costmap_2d_ros.cpp of Nav2, getParameters, and makeFootprintFromParams of ROS 1 ask for a footprint first"
+_LOCAL = "local_costmap"
 _COSTMAP_SOURCE = "costmap_2d_ros.cpp of ros-planning/navigation (noetic)"
 
 
@@ -52,9 +54,14 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         yield from _place(file, result, place, likely, is_told=bool(distribution))
     for entry, key in result.not_loaded:
         name = split(entry)[-2]
+        if _is_spare(file, entry):
+            continue
         text = f"Nothing loads {name}: no list of {key} names it."
         yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
-    yield from _nodes(file, distribution)
+    if result.ros == "ros2":
+        yield from _nodes(file, distribution)
+        yield from plugins.check(file, distribution)
+    yield from _unused(file, result)
     yield from values(file, result)
 
 
@@ -85,7 +92,7 @@ def _place(
     if not place.owners:
         return
     if not facts:
-        problem = _unknown(file, result, place)
+        problem = _unknown(file, result, place, likely)
         if problem is not None:
             yield problem
         return
@@ -101,9 +108,12 @@ def _place(
     yield from _value(file, place.entry, now or facts, ros)
 
 
-def _unknown(file: ConfigFile, result: Scoped, place: Place) -> Problem | None:
+def _unknown(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str]) -> Problem | None:
     """A name that its reader does not read."""
     owner = place.owners[0]
+    leftover = next((one for one in LEFTOVERS if one.owner in place.owners and one.name == place.name), None)
+    if leftover is not None and (leftover.reads or str(place.entry.value) == leftover.default):
+        return _leftover(file, place, leftover)
     own = [name for one in place.owners for name in navigation.keys_of(result.ros, one)]
     last = place.name.rpartition(".")[2]
     if result.ros == "ros1" and _is_searched(result, place):
@@ -111,14 +121,51 @@ def _unknown(file: ConfigFile, result: Scoped, place: Place) -> Problem | None:
     meant = MEANT.get((owner, place.name)) or next(
         iter(get_close_matches(last, [name.rpartition(".")[2] for name in own], n=1, cutoff=_ALIKE)), ""
     )
-    elsewhere = [one for one in navigation.readers(result.ros, place.name) if one not in place.owners]
+    elsewhere = _readers(result, place, likely)
     hint = f"Did you mean {meant}?" if meant else "Is it of another plugin, or of another release?"
-    if elsewhere and not (meant and MEANT.get((owner, place.name))):
+    if elsewhere and (owner, place.name) not in MEANT:
         text = f"{owner} does not read {place.name}; {', '.join(elsewhere[:3])} would."
-        hint = hint if meant else "Move it there, or leave it out."
+        hint = "Move it there, or leave it out."
         return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
     text = f"{place.name} is not a parameter of {owner} in any release from {' to '.join(_ends(result))}."
     return problem_at("unknown-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
+
+
+def _readers(result: Scoped, place: Place, likely: frozenset[str]) -> list[str]:
+    """Who else reads a name: those that the file configures first, then those of its release."""
+    found = [one for one in navigation.readers(result.ros, place.name) if one not in place.owners]
+    held = {owner for one in result.places for owner in one.owners}
+    facts = {one: navigation.known(result.ros, one, place.name) for one in found}
+    is_now = {
+        one: any(navigation.distributions(fact, result.ros) & likely for fact in several)
+        for one, several in facts.items()
+    }
+    return sorted(found, key=lambda one: (one not in held, not is_now[one]))
+
+
+def _leftover(file: ConfigFile, place: Place, leftover: Leftover) -> Problem | None:
+    """A name that Nav2's own files hold as well: wrong only where what counts is another value."""
+    values = {split(entry): entry for entry in file.entries}
+    parts = [
+        keys[:-1] for keys, one in values.items() if keys[-1] == "plugin" and class_of(str(one.value)) in leftover.reads
+    ]
+    held = {part: str(one.value) if (one := values.get((*part, leftover.name))) else leftover.default for part in parts}
+    value = str(place.entry.value)
+    part, other = next(((part, one) for part, one in held.items() if one != value), ((), leftover.default))
+    if value == other or (parts and not part):
+        return None
+    name = part[-1] if part else "a goal checker"
+    text = f"{place.owners[0]} does not read {place.name}: that is for {name}, where it is {other}."
+    hint = f"Write {place.name}: {value} under {name}, or leave it out."
+    return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, leftover.source)
+
+
+def _is_spare(file: ConfigFile, entry: Entry) -> bool:
+    """Whether a layer that nothing loads is a map's in the local costmap, as Nav2's own files have it since humble."""
+    keys = split(entry)
+    values = {key[-1]: one.value for one in file.entries if (key := split(one))[:-1] == keys[:-1]}
+    is_map = class_of(str(values.pop("plugin", ""))) == "StaticLayer"
+    return is_map and _LOCAL in keys and values in ({}, {"map_subscribe_transient_local": "true"})
 
 
 def _ends(result: Scoped) -> tuple[str, str]:
@@ -159,7 +206,9 @@ def _other_distribution(
     if not is_told or not _is_covered(result, place.owners[0], likely):
         return None
     known = frozenset(name for fact in facts for name in navigation.distributions(fact, result.ros))
-    text = f"{place.owners[0]} reads {place.name} in {_span(known, order)}, not in {next(iter(likely))}."
+    text = (
+        f"{place.owners[0]} reads {place.name} in {navigation.spans(known, result.ros)}, not in {next(iter(likely))}."
+    )
     return problem_at(
         "unknown-key", severity, file, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
     )
@@ -171,11 +220,6 @@ def _is_covered(result: Scoped, owner: str, likely: frozenset[str]) -> bool:
         fact for name in navigation.keys_of(result.ros, owner) for fact in navigation.known(result.ros, owner, name)
     )
     return any(fact.owner == owner and navigation.distributions(fact, result.ros) & likely for fact in facts)
-
-
-def _span(names: frozenset[str], order: Sequence[str]) -> str:
-    held = [name for name in order if name in names]
-    return ", ".join(held) if len(held) < 3 else f"{held[0]} to {held[-1]}"
 
 
 def _dead(result: Scoped, place: Place) -> tuple[str, str] | None:
@@ -258,6 +302,7 @@ def _as_type(entry: Entry, types: set[str]) -> str:
 
 
 def _nodes(file: ConfigFile, distribution: str) -> Iterator[Problem]:
+    """Nodes by a name that the file's release does not have any more; where nobody says which that is, a note."""
     order = DISTRIBUTIONS["ros2"]
     seen: set[str] = set()
     for entry in file.entries:
@@ -270,6 +315,25 @@ def _nodes(file: ConfigFile, distribution: str) -> Iterator[Problem]:
                 text = f"The node {old} is {new} since {since}: later distributions do not read this part."
                 severity = Severity.WARNING if is_told else Severity.NOTE
                 yield problem_at("renamed", severity, file, entry, text, f"Name it {new}.", STACKS["ros2"])
+
+
+def _unused(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+    """A radius beside a footprint, which alone counts."""
+    scopes = result.scopes()
+    for scope in costmaps(result):
+        footprint, radius = scopes.get(scope, {}).get("footprint"), scopes.get(scope, {}).get("robot_radius")
+        if footprint is None or radius is None or radius.number is None:
+            continue
+        inner, outer = contradictions.inscribed_radius(footprint, None), contradictions.reach(footprint)
+        if inner is None or outer is None:
+            continue
+        is_alike = inner <= radius.number <= outer
+        text = f"robot_radius ({radius.number:g} m) is not used where footprint is set"
+        if not is_alike:
+            text += f", which reaches from {inner:.3g} to {outer:.3g} m"
+        severity = Severity.NOTE if is_alike else Severity.WARNING
+        hint = f"Leave one of the two out{f'; the other is in line {footprint.line}' if footprint.line else ''}."
+        yield problem_at("dead-key", severity, file, radius, f"{text}.", hint, _SHAPE, (footprint.name,))
 
 
 def _contradictions(file: ConfigFile, result: Scoped) -> Iterator[Problem]:

@@ -16,6 +16,7 @@ from care_core.ecosystems.ardupilot.parameter_file import FLAGS
 from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.px4.dialect import QGC_PARAMS, is_row
 from care_core.ecosystems.ros import yaml_tree
+from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.errors import ConfigError
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import BY_ID
@@ -46,7 +47,7 @@ def read_file(path: Path, namespace: str = "") -> tuple[ConfigFile, tuple[Proble
     entries: list[Entry] = []
     named: list[Named] = []
     if root is not None:
-        _walk(root, (), entries, named)
+        _walk(root, (), entries, named, letters=format is ROS2_YAML)
     held = tuple(entry for entry in entries if not _is_too_large(entry))
     problems = tuple(_too_large(path, one.line, one.column, one.name) for one in entries if _is_too_large(one))
     return ConfigFile(path, format, text, held, tuple(named), namespace), problems
@@ -67,15 +68,16 @@ def _too_large(path: Path, line: int, column: int, name: str) -> Problem:
     return syntax(path, line, column, name, f"{name} is larger than any number can be.", "")
 
 
-def _walk(node: MappingNode, keys: tuple[str, ...], entries: list[Entry], named: list[Named]) -> None:
+def _walk(node: MappingNode, keys: tuple[str, ...], entries: list[Entry], named: list[Named], *, letters: bool) -> None:
     dumped = yaml_tree.is_dumped(node)
     for key, value in node.value:
         name = str(key.value).strip("/") or str(key.value)
         here = keys if dumped and name == _DICTITEMS else (*keys, *name.split("/"))
         if isinstance(value, MappingNode):
-            _walk(value, here, entries, named)
-        elif not dumped and (plain := yaml_tree.plain_value(value)) is not None:
-            kind = _TAGS.get(str(value.tag).rpartition(":")[2], "str")
+            _walk(value, here, entries, named, letters=letters)
+        elif not dumped and (plain := yaml_tree.plain_value(value, letters=letters)) is not None:
+            is_bool = yaml_tree.is_bool(value, letters=letters)
+            kind = "bool" if is_bool else _TAGS.get(str(value.tag).rpartition(":")[2], "str")
             mark = key.start_mark
             entries.append(Entry(here, plain, mark.line + 1, mark.column + 1, kind))
         elif isinstance(value, SequenceNode):

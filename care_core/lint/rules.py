@@ -21,6 +21,7 @@ RULES: tuple[Rule, ...] = (
     Rule("misplaced-key", "A name that is read elsewhere, but not at that place.", _TABLES),
     Rule("renamed", "A name that another release has instead.", _TABLES),
     Rule("dead-key", "A name that is known and has no effect here.", "the source file that the problem names"),
+    Rule("plugin-name", "A plugin that the release, or any, has under another name.", "its plugin description files"),
     Rule("not-loaded", "Parameters of a plugin that no list names.", "plugins are loaded by the lists that name them"),
     Rule("wrong-type", "A value of another type than is declared.", "rclcpp refuses it, roscpp takes the default"),
     Rule("out-of-range", "A value outside the declared range.", _TABLES),
@@ -76,6 +77,32 @@ ROS2_RENAMED: tuple[Renamed, ...] = (
 
 ROS2_NODES_RENAMED: tuple[tuple[str, str, str], ...] = (("recoveries_server", "behavior_server", "humble"),)
 """Nodes: the old name, the new one, and the distribution that has it."""
+
+
+class Leftover(NamedTuple):
+    """A name that files of Nav2 itself hold and nothing reads: with the value that counts anyway it misleads nobody."""
+
+    owner: str
+    name: str
+    reads: tuple[str, ...]
+    """Who reads it, under the part of its own."""
+    default: str
+    """What those take where nothing is written."""
+    source: str
+
+
+LEFTOVERS: tuple[Leftover, ...] = (
+    Leftover(
+        "DWBLocalPlanner", "stateful",
+        ("SimpleGoalChecker", "StoppedGoalChecker", "PositionGoalChecker", "AdaptiveToleranceGoalChecker"), "true",
+        "simple_goal_checker.cpp declares it under the name of the goal checker, and dwb_core nothing of that name",
+    ),
+    Leftover(
+        "docking_server", "simulation_step", (), "0.1",
+        "controller.cpp of opennav_docking declares controller.simulation_time_step",
+    ),
+)  # fmt: skip
+"""nav2_params.yaml of foxy to iron holds the first, that of jazzy to rolling the second."""
 
 MEANT: dict[tuple[str, str], str] = {
     ("DWAPlannerROS", "max_vel_rot"): "max_vel_theta",

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
-from care_core.ecosystems.ros.dialect import ROS2_YAML
+from care_core.ecosystems.ros.dialect import ROS1_YAML, ROS2_YAML
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.problems import ConfigFile, Entry
 from care_core.metadata import navigation
 from care_core.metadata.navigation import Ros
 from care_core.records import Struct, field
+from care_core.run import Setting
 
 Keys = tuple[str, ...]
 
@@ -77,6 +79,25 @@ def split(entry: Entry) -> Keys:
 def class_of(text: str) -> str:
     """The name of a plugin's class without its package."""
     return re.split(r"::|/", text)[-1]
+
+
+def as_file(parameters: Mapping[str, Setting], path: Path, *, is_ros2: bool) -> ConfigFile:
+    """The parameters of a run as a file of them, in their order; a value of the log has no line."""
+    entries = []
+    for name, one in parameters.items():
+        node, _, own = name.partition(".")
+        keys = tuple(part for part in (node if is_ros2 else name).split("/") if part)
+        if is_ros2:
+            keys = (*keys, PARAMETERS, *own.split("."))
+        line = one.source.rpartition(":")[2]
+        entries.append(Entry(keys, one.value, int(line) if line.isdigit() else 0, 1, _kind(one.value)))
+    return ConfigFile(path, ROS2_YAML if is_ros2 else ROS1_YAML, "", tuple(entries))
+
+
+def _kind(value: float | str) -> str:
+    if isinstance(value, str):
+        return "bool" if value in ("true", "false") else "list" if value.startswith("[") else "str"
+    return "int" if isinstance(value, int) else "float"
 
 
 def scoped(file: ConfigFile) -> Scoped:

@@ -4,7 +4,7 @@ several readers beside each other."""
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -23,6 +23,8 @@ INFLATIONS = ("InflationLayer", "LegacyInflationLayer", "AsymmetricInflationLaye
 SAMPLED = ("DWAPlannerROS", "TrajectoryPlannerROS", "DWBLocalPlanner")
 """Planners that try speeds out, over a time ahead."""
 TOP_SPEEDS = ("max_vel_x", "vx_max", "desired_linear_vel", "max_linear_vel", "v_linear_max")
+_RANGES = {"obstacle_max_range": 2.5, "raytrace_max_range": 3.0}
+"""What a source of Nav2's obstacle layers has where nothing is written, m (obstacle_layer.cpp)."""
 _OTHER_ROBOT = 1.5
 """How far apart the sizes of one robot in two costmaps are never meant to be: padding makes a few percent."""
 
@@ -36,9 +38,14 @@ class Above(NamedTuple):
     source: str
     sign: int = 1
     rule: str = "cannot-work"
+    zero: bool = False
+    """Whether 0 is a value like others."""
+    unless_off: str = ""
+    """A switch without which the value is not used."""
 
 
 _SPEED = "the planner samples speeds up to it"
+_SAMPLES = "dwb_plugins, xy_theta_iterator.cpp: speeds are sampled between the least and the largest"
 _TOLERANCE = "a goal is reached when the distance is below it"
 ABOVE: tuple[Above, ...] = (
     Above(("move_base", "controller_server"), ("controller_frequency",), "no command is ever computed",
@@ -55,6 +62,36 @@ ABOVE: tuple[Above, ...] = (
           "the speed can never change", "speeds are sampled as far as this acceleration leads in a step"),
     Above(("DWBLocalPlanner",), ("decel_lim_x", "decel_lim_theta"), "the robot cannot slow down",
           "dwb_plugins, one_d_velocity_iterator.hpp: a deceleration is negative", -1),
+    Above(("DWBLocalPlanner",), ("acc_lim_y",), "the speed sideways can never change",
+          "dwb_plugins, one_d_velocity_iterator.hpp: an acceleration is positive", zero=True),
+    Above(("DWBLocalPlanner",), ("decel_lim_y",), "the robot cannot slow down sideways",
+          "dwb_plugins, one_d_velocity_iterator.hpp: a deceleration is negative", -1, zero=True),
+    Above(("DWBLocalPlanner",), ("min_vel_x",), "the robot can neither stop nor turn in place", _SAMPLES, -1,
+          "hinders", zero=True),
+    Above(("DWBLocalPlanner",), ("min_vel_y",), "the robot always drifts sideways", _SAMPLES, -1, "hinders", zero=True),
+    Above(("DWBLocalPlanner",), ("max_vel_y",), "the robot always drifts sideways", _SAMPLES, 1, "hinders", zero=True),
+    Above(("MPPIController",), ("vx_min",), "the robot can neither stop nor turn in place",
+          "optimizer.cpp keeps the speed between vx_min and vx_max", -1, "hinders", zero=True),
+    Above(("MPPIController",), ("vy_max", "ay_max"), "no speed sideways is within its limits",
+          "optimizer.cpp keeps speeds sideways between -vy_max and vy_max, and their change below ay_max", zero=True),
+    Above(("MPPIController",), ("ax_min", "ay_min"), "it is a deceleration, of which MPPI turns the sign",
+          "optimizer.cpp: a deceleration is negative", -1, "contradiction", zero=True),
+    Above(("RegulatedPurePursuitController", "RotationShimController"),
+          ("rotate_to_heading_angular_vel", "max_angular_accel"), "the robot cannot turn to its path",
+          "the controller turns in place at this speed, reached with this acceleration",
+          unless_off="use_rotate_to_heading"),
+    Above(("RegulatedPurePursuitController",), ("lookahead_time", "min_lookahead_dist"),
+          "there is nothing ahead to drive to", "the look-ahead is the speed times lookahead_time, at least "
+          "min_lookahead_dist", zero=True),
+    Above(("RegulatedPurePursuitController",), ("min_approach_linear_velocity", "regulated_linear_scaling_min_speed"),
+          "it is the least speed while the robot slows down", "regulation_functions.hpp keeps the speed above it",
+          1, "contradiction", zero=True),
+    Above(("GracefulController",), ("v_linear_min", "v_angular_max"), "it is a size of a speed",
+          "smooth_control_law.cpp keeps the size of speeds between them", zero=True),
+    Above(("behavior_server",), ("max_rotational_vel",), "the robot cannot turn in place",
+          "spin.cpp turns at most at this speed"),
+    Above(("behavior_server",), ("min_rotational_vel",), "it is a size of a speed", "spin.cpp turns no slower",
+          zero=True),
     Above(SAMPLED, ("sim_time", "sim_granularity", "linear_granularity", "angular_granularity"),
           "no trajectory is simulated", "the trajectory generators step through sim_time by the granularity"),
     Above(("RegulatedPurePursuitController",), ("lookahead_dist", "max_lookahead_dist"),
@@ -114,6 +151,9 @@ class Reader(Struct, eq=False):
     def is_off(self, name: str) -> bool:
         return name in self.values and self.values[name].value == "false"
 
+    def is_on(self, name: str) -> bool:
+        return name in self.values and self.values[name].value == "true"
+
     def own(self, name: str) -> list[Entry]:
         """A value of its own or of its parts, such as the sources of a layer."""
         return [entry for key, entry in self.values.items() if key.rpartition(".")[2] == name]
@@ -162,15 +202,16 @@ def check(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
 
 def _above(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
     for rule in ABOVE:
-        if not reader.is_a(*rule.owners):
+        if not reader.is_a(*rule.owners) or reader.is_off(rule.unless_off):
             continue
         for key, entry in reader.values.items():
             if key.rpartition(".")[2] not in rule.names or entry.number is None or _is_of_source(key):
                 continue
-            if entry.number * rule.sign < 0 or entry.number == 0:
+            if entry.number * rule.sign < 0 or (entry.number == 0 and not rule.zero):
                 text = f"{entry.keys[-1]} is {entry.number:g}: {rule.why}."
                 side = {1: "above", -1: "below", 0: "other than"}[rule.sign]
-                yield _problem(rule.rule, file, entry, text, f"It must be {side} 0.", rule.source)
+                hint = f"It must be 0 or {side} it." if rule.zero else f"It must be {side} 0."
+                yield _problem(rule.rule, file, entry, text, hint, rule.source)
 
 
 def _is_of_source(key: str) -> bool:
@@ -374,14 +415,29 @@ def _marks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 hint = f"Switch {name} on for one."
                 yield _problem("hinders", file, switches[0], text, hint, "obstacle_layer.cpp", switches[1:])
     for reader in held.of(*OBSTACLES, COSTMAP):
-        for short, far in (("raytrace_range", "obstacle_range"), ("raytrace_max_range", "obstacle_max_range")):
-            for entry in reader.own(far):
-                key = next(key for key, one in reader.values.items() if one is entry)
-                other = reader.values.get(f"{key[: len(key) - len(far)]}{short}")
-                if other is not None and other.number and entry.number and 0 < other.number < entry.number:
-                    text = f"{far} ({entry.number:g} m) is above {short} ({other.number:g} m)."
-                    hint = "What is marked beyond is never cleared."
-                    yield _problem("contradiction", file, other, text, hint, "obstacle_layer.cpp", [entry])
+        yield from _uncleared(file, reader)
+
+
+def _uncleared(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
+    """Sources that mark obstacles farther away than they clear."""
+    for short, far in (("raytrace_range", "obstacle_range"), ("raytrace_max_range", "obstacle_max_range")):
+        keys = {key[: -len(last)] for key in reader.values for last in (short, far) if key.endswith(last)}
+        for source in sorted(keys):
+            marked, cleared = reader.values.get(f"{source}{far}"), reader.values.get(f"{source}{short}")
+            one_is_default = marked is None or cleared is None
+            if reader.is_off(f"{source}marking") or reader.is_off(f"{source}clearing"):
+                continue
+            if one_is_default and (short not in _RANGES or not source or not reader.is_on(f"{source}clearing")):
+                continue
+            far_m, short_m = (_RANGES.get(name, 0.0) if one is None else one.number or 0.0
+                              for one, name in ((marked, far), (cleared, short)))  # fmt: skip
+            entry = cleared or marked
+            if entry is not None and 0 < short_m < far_m:
+                said = [" by default" if one is None else "" for one in (marked, cleared)]
+                text = f"{far} ({far_m:g} m{said[0]}) is above {short} ({short_m:g} m{said[1]})."
+                hint = "What is marked beyond is never cleared."
+                others = [marked] if cleared is not None and marked is not None else []
+                yield _problem("contradiction", file, entry, text, hint, "obstacle_layer.cpp", others)
 
 
 def _goal_checks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -425,6 +481,19 @@ def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield _problem("cannot-work", file, entries[0], text, "Raise them.", "dwa_planner.cpp", entries[1:])
 
 
+_SMOOTHER = "velocity_smoother.cpp of every release, on_configure"
+_SINCE_IRON = "velocity_smoother.cpp, on_configure, since iron; in humble the command is kept between the two"
+_REFUSED = "the node will not start"
+_FORCED = "the node will not start, and that of humble drives the robot on when it is to stop"
+_VECTORS: Mapping[str, tuple[int, str, str]] = {
+    "max_velocity": (1, _FORCED, _SINCE_IRON), "min_velocity": (-1, _FORCED, _SINCE_IRON),
+    "max_accel": (1, _REFUSED, _SMOOTHER), "max_decel": (-1, _REFUSED, _SMOOTHER),
+    "deadband_velocity": (0, "", ""),
+}  # fmt: skip
+"""Lists of the velocity smoother: the sign of their numbers, what happens with another, and what says so."""
+_AXES = "Give it 3, for x, y and the turn; since lyrical all five lists may have 6."
+
+
 def _smoothed(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     """A smoother that lets nothing through."""
     top = held.one(CONTROLLERS, TOP_SPEEDS)
@@ -432,14 +501,38 @@ def _smoothed(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         for name in ("max_velocity", "max_accel"):
             entry = reader.values.get(name)
             first = _numbers(entry)[:1]
-            if entry is not None and first and first[0] <= 0:
-                text = f"{name} of velocity_smoother begins with {first[0]:g}: the robot never moves."
+            if entry is not None and first and first[0] == 0:
+                text = f"{name} of velocity_smoother begins with 0: the robot never moves."
                 yield _problem("cannot-work", file, entry, text, "It must be above 0.", "velocity_smoother.cpp")
         entry = reader.values.get("deadband_velocity")
         first = _numbers(entry)[:1]
         if entry is not None and top is not None and top.number and first and first[0] >= top.number > 0:
             text = f"deadband_velocity ({first[0]:g}) swallows every speed up to {top.keys[-1]} ({top.number:g})."
             yield _problem("contradiction", file, entry, text, "Lower it.", "velocity_smoother.cpp", [top])
+
+
+def _vectors(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Lists of the velocity smoother that it refuses: of another length, or with the wrong sign."""
+    for reader in held.of("velocity_smoother"):
+        lists = {name: one for name in _VECTORS if (one := reader.values.get(name)) is not None and _numbers(one)}
+        sizes = {name: len(_numbers(one)) for name, one in lists.items()}
+        wanted = 6 if len(sizes) == len(_VECTORS) and set(sizes.values()) == {6} else 3
+        for name, entry in lists.items():
+            numbers = _numbers(entry)
+            if len(numbers) != wanted:
+                text = f"{name} has {_count(len(numbers), 'number')}: the node will not start."
+                yield problem_at("cannot-work", Severity.ERROR, file, entry, text, _AXES, _SMOOTHER)
+            sign, why, source = _VECTORS[name]
+            wrong = next((one for one in numbers if one * sign < 0), None)
+            if sign and wrong is not None:
+                side = "above" if sign > 0 else "below"
+                text = f"{name} holds {wrong:g}: {why}."
+                hint = f"Each of its numbers must be 0 or {side} it."
+                yield problem_at("cannot-work", Severity.ERROR, file, entry, text, hint, source)
+
+
+def _count(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _numbers(entry: Entry | None) -> list[float]:
@@ -466,5 +559,5 @@ def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
 
 RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
     _simulated, _settles, _starts, _progress, _window, _cells, _sizes, _marks, _goal_checks, _unknown_space, _drawn,
-    _smoothed, _clocks,
+    _smoothed, _vectors, _clocks,
 )  # fmt: skip

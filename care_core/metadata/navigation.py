@@ -70,14 +70,31 @@ def known(ros: Ros, owner: str, name: str) -> tuple[Fact, ...]:
 
 def distributions(fact: Fact, ros: Ros) -> frozenset[str]:
     """The distributions in which a fact holds."""
+    return spanned(fact.releases, ros)
+
+
+def spanned(releases: str, ros: Ros) -> frozenset[str]:
+    """The distributions of a text such as `foxy humble-jazzy`; all of them where it is empty."""
     order = DISTRIBUTIONS[ros]
-    if not fact.releases:
+    if not releases:
         return frozenset(order)
     found: set[str] = set()
-    for span in fact.releases.split():
+    for span in releases.split():
         first, _, last = span.partition("-")
         found |= set(order[order.index(first) : order.index(last or first) + 1])
     return frozenset(found)
+
+
+def spans(names: Collection[str], ros: Ros) -> str:
+    """Distributions in words: `foxy, humble to jazzy`."""
+    order = DISTRIBUTIONS[ros]
+    runs: list[list[str]] = []
+    for place, name in enumerate(order):
+        if name in names:
+            if not runs or order[place - 1] not in names:
+                runs.append([])
+            runs[-1].append(name)
+    return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
 
 
 def fact_of(ros: Ros, parameter: str, distribution: str = "", owner: str = "") -> Fact | None:

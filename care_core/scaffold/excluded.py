@@ -15,6 +15,7 @@ _WIRING = "wiring, radio, logging and what is fitted"
 _CODES = "codes and bit masks whose meaning is not known here"
 _SIMULATOR = {"the simulated world": (f"{SIMULATOR_PREFIX}*", "SIH_*")}
 _ROBOT = "what the robot and its map are"
+_SHOWN = "what it shows to whoever looks on"
 
 EXCLUDED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "ardupilot": {
@@ -49,13 +50,37 @@ EXCLUDED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
             "MAN_ARM_*",
         ),
     },
-    "ros1": {_ROBOT: ("width", "height", "origin_*", "robot_radius", "footprint", "use_sim_time", "restore_defaults")},
+    "ros1": {
+        _ROBOT: ("width", "height", "origin_*", "robot_radius", "footprint", "use_sim_time", "restore_defaults"),
+        _SHOWN: ("publish_cost_grid*", "publish_traj_pc", "publish_voxel_map", "visualize_*", "map_vis_z"),
+    },
     "ros2": {
-        _ROBOT: ("width", "height", "origin_*", "robot_radius", "footprint", "use_sim_time", "robot_base*"),
-        "how its messages are sent": ("qos_overrides.*", "bond_*", "service_introspection*", "start_type_description*"),
+        _ROBOT: ("width", "height", "origin_*", "robot_radius", "footprint", "use_sim_time", "robot_base*",
+                 "initial_pose.*", "set_initial_pose", "always_reset_initial_pose", "first_map_only",
+                 "rolling_window", "unknown_cost_value", "external_detection_*", "*.marking", "*.clearing",
+                 "*.inf_is_valid"),
+        "how its messages are sent": (
+            "qos_overrides.*", "bond_*", "*service_introspection*", "introspection_mode", "action_introspection*",
+            "start_type_description*", "enable_stamped_cmd_vel", "map_subscribe_transient_local",
+            "allow_parameter_qos_overrides",
+        ),
+        "how its nodes are started and watched": (
+            "autostart*", "attempt_respawn*", "respawn_*", "use_respawn", "use_composition", "use_intra_process*",
+            "use_realtime_priority", "diagnostic_updater*", "log_level", "*groot_*", "stop_on_failure",
+        ),
+        _SHOWN: (
+            "publish_cost_grid*", "publish_evaluation", "publish_global_plan", "publish_local_plan",
+            "publish_trajectories", "publish_transformed_plan", "publish_voxel_map", "publish_critics_stats",
+            "publish_optimal_trajectory*", "marker_lifetime", "visualize*", "*TrajectoryVisualizer.*",
+            "always_send_full_costmap", "map_vis_z", "debug_*", "viz_*",
+        ),
     },
 }  # fmt: skip
 """Reason -> names: of a vehicle's parameter the whole name, of a node's what follows the node."""
+
+_SIMULATED = "loopback_simulator"
+_HELPER = "_rclcpp_node"
+"""How Nav2 calls nodes beside its servers: they are given the file of their server, and read next to nothing of it."""
 
 SAFETY = re.compile(
     "|".join(map(translate, ("FS_*", "FENCE_*", "BATT*_LOW_*", "BATT*_CRT_*", "BAT*_THR", "COM_LOW_BAT_*", "GF_*",
@@ -71,7 +96,11 @@ def reason_to_exclude(stack: str, parameter: str) -> str:
         name = parameter.rpartition("/")[2]
     elif stack == "ros2":
         node, dot, own = parameter.partition(".")
-        name = own if dot else node
+        if node.endswith(_HELPER):
+            return "a helper node of another, whose own copy counts"
+        if node.rpartition("/")[2] == _SIMULATED:
+            return "the simulated world"
+        name = (own if dot else node).lstrip("/")
     spellings = {name, name.rpartition(".")[2]}
     for reason, patterns in EXCLUDED.get(stack, {}).items():
         if any(re.fullmatch(translate(pattern), one) for pattern in patterns for one in spellings):

@@ -8,8 +8,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from care_core.configs.driven import same_value
+from care_core.lint.scopes import as_file, scoped
 from care_core.metadata.fact import Fact
-from care_core.metadata.navigation import fact_of, is_ros
+from care_core.metadata.navigation import Ros, fact_of, is_ros
+from care_core.metadata.navigation import known as known_facts
 from care_core.records import Record, Struct, field
 from care_core.run import Setting
 from care_core.scaffold.excluded import SAFETY, reason_to_exclude
@@ -87,21 +89,65 @@ def find_options(logs: Sequence[InputLog], known: Mapping[str, Variable], taken:
     stack = logs[0].stack
     found = Options()
     chosen: list[tuple[_Driven, Fact | None]] = []
+    read = _read_by_whom(logs) if is_ros(stack) else {}
     for driven in _all_driven(logs):
-        fact = fact_of(stack, driven.name) if is_ros(stack) else None
+        facts = read.get(driven.name)
+        fact = _fact_of(driven, facts) if facts else fact_of(stack, driven.name) if is_ros(stack) else None
         reason = _reason_to_exclude(stack, driven, len(logs), fact, known)
         if reason:
             found.leave(driven.name, reason)
         else:
             chosen.append((driven, fact))
+    chosen, sets = _together(chosen, known)
     names = _short_names([driven.name for driven, _ in chosen], known, set(taken))
     for driven, fact in chosen:
-        option = _option(names[driven.name], driven, stack, fact, known.get(driven.name))
+        option = _option(names[driven.name], driven, stack, fact, known.get(driven.name), sets.get(driven.name, ()))
         if option is None:
             found.leave(driven.name, "they are 0 and nothing says how large they may be")
         else:
             found.chosen.append(option)
     return found
+
+
+def _read_by_whom(logs: Sequence[InputLog]) -> dict[str, tuple[Fact, ...]]:
+    """What the table says of each parameter by the plugin that reads it, which the parameters themselves name."""
+    settings = {name: history[-1] for log in logs for name, history in log.settings.items() if history}
+    ros: Ros = "ros2" if logs[0].stack == "ros2" else "ros1"
+    file = as_file(settings, logs[0].path, is_ros2=ros == "ros2")
+    names = {id(entry): name for name, entry in zip(settings, file.entries, strict=True)}
+    return {
+        names[id(place.entry)]: tuple(fact for owner in place.owners for fact in known_facts(ros, owner, place.name))
+        for place in scoped(file).places
+        if place.owners
+    }
+
+
+def _fact_of(driven: _Driven, facts: Sequence[Fact]) -> Fact:
+    """Of what the releases say that whose default was driven, else the newest."""
+    usual = driven.usual[0] if any(number(value) is not None for value in driven.last) else None
+    alike = (one for one in facts if usual is not None and _same(one.default_number, usual))
+    return next(alike, facts[-1])
+
+
+def _same(default: float | None, value: float) -> bool:
+    return default is not None and same_value(default, value)
+
+
+def _together(
+    chosen: Sequence[tuple[_Driven, Fact | None]], known: Mapping[str, Variable]
+) -> tuple[list[tuple[_Driven, Fact | None]], dict[str, tuple[str, ...]]]:
+    """What a bundled profile sets as one, where it was driven as one: the first of each, and all that this one sets."""
+    by_name = {driven.name: driven for driven, _ in chosen}
+    sets: dict[str, tuple[str, ...]] = {}
+    for name, driven in by_name.items():
+        option = known.get(name)
+        own = () if option is None else tuple(one for one in option.parameters if known.get(one) is option)
+        if len(own) > 1 and own[0] == name:
+            alike = [one for one in own if one in by_name and by_name[one].last == driven.last]
+            if len(alike) > 1:
+                sets[name] = tuple(alike)
+    others = {other for name, several in sets.items() for other in several if other != name}
+    return [(driven, fact) for driven, fact in chosen if driven.name not in others], sets
 
 
 def _all_driven(logs: Sequence[InputLog]) -> list[_Driven]:
@@ -160,7 +206,9 @@ def _ends_alike(other: str, parts: Sequence[str]) -> bool:
     return own[-len(parts) :] == list(parts)
 
 
-def _option(name: str, driven: _Driven, stack: str, fact: Fact | None, known: Variable | None) -> Option | None:
+def _option(
+    name: str, driven: _Driven, stack: str, fact: Fact | None, known: Variable | None, sets: tuple[str, ...]
+) -> Option | None:
     kind, labels, type_from = _type(driven, stack, fact, known)
     reference, reference_from = _reference(driven, stack, known)
     bounds = (0.0, 1.0), "yes or no"
@@ -182,7 +230,7 @@ def _option(name: str, driven: _Driven, stack: str, fact: Fact | None, known: Va
         range=(low, high),
         default=reference,
         labels=labels,
-        parameters=(driven.name,),
+        parameters=sets or (driven.name,),
         safety=SAFETY.match(driven.name) is not None,
     )
     said = [f"range: {range_from}", f"default: {reference_from}", f"type: {type_from}", _driven_as(driven)]

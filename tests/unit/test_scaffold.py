@@ -76,6 +76,34 @@ def test_what_nobody_chose_is_never_an_option(name: str) -> None:
     assert found.left == {reason_to_exclude("ardupilot", name): [name]}
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "/controller_server./bond_disable_heartbeat_timeout", "/controller_server.bond_heartbeat_period",
+        "/lifecycle_manager_navigation.autostart", "/controller_server.autostart_node", "/amcl.use_sim_time",
+        "/controller_server.qos_overrides./tf.subscription.depth", "/controller_server.enable_stamped_cmd_vel",
+        "/bt_navigator.navigate_to_pose.groot_server_port", "/controller_server.FollowPath.publish_evaluation",
+        "/controller_server.FollowPath.TrajectoryVisualizer.trajectory_step", "/planner_server.introspection_mode",
+        "/bt_navigator_navigate_to_pose_rclcpp_node.bt_loop_duration", "/amcl.initial_pose.x",
+    ],
+)  # fmt: skip
+def test_what_nobody_tunes_of_nav2_is_never_an_option(name: str) -> None:
+    found = options(seen({name: 3.0}, ros="2"), seen({name: 5.0}, ros="2"))
+    assert found.chosen == []
+    assert found.left == {reason_to_exclude("ros2", name): [name]}
+
+
+def test_what_a_bundled_profile_sets_as_one_is_one_option_with_one_range() -> None:
+    speed = Variable("speed", Role.OPTION, unit="m/s", range=(0.1, 0.9), parameters=("/c.max_vel_x", "/c.max_speed_xy"))
+    known = dict.fromkeys(speed.parameters, speed)
+    both = {"/c.max_vel_x": 0.5, "/c.max_speed_xy": 0.5}
+    (option,) = options(seen(both, ros="2"), known=known).chosen
+    assert (option.variable.name, option.variable.range) == ("speed", (0.1, 0.9))
+    assert option.variable.parameters == ("/c.max_vel_x", "/c.max_speed_xy")
+    apart = options(seen({**both, "/c.max_speed_xy": 0.7}, ros="2"), known=known).chosen
+    assert [one.variable.parameters for one in apart] == [("/c.max_speed_xy",), ("/c.max_vel_x",)]
+
+
 def test_a_parameter_at_its_default_is_left_out_unless_a_profile_knows_it() -> None:
     log = seen({"TECS_CLMB_MAX": 5.0, "NAVL1_PERIOD": 22.0}, defaults={"TECS_CLMB_MAX": 5.0, "NAVL1_PERIOD": 17.0})
     (option,) = options(log).chosen
@@ -130,6 +158,19 @@ def test_the_table_knows_a_parameter_by_its_owner() -> None:
     assert dict(layer.values)[1.0] == "Maximum"
     assert fact_of("ros2", "/somebody.else") is None
     assert fact_of("ros1", "/stranger/sim_time") is None
+
+
+def test_a_parameter_of_a_plugin_is_told_by_the_class_that_reads_it() -> None:
+    follow = "/controller_server.FollowPath"
+    mppi = {
+        f"{follow}.plugin": "nav2_mppi_controller::MPPIController", f"{follow}.critics": "[ConstraintCritic]",
+        f"{follow}.ConstraintCritic.cost_weight": 4.0, f"{follow}.time_steps": 56, f"{follow}.batch_size": 2000,
+    }  # fmt: skip
+    found = options(seen(mppi, ros="2"))
+    assert [one.variable.name for one in found.chosen] == ["batch_size"]
+    assert found.left["at their default in every log"] == [
+        f"{follow}.ConstraintCritic.cost_weight", f"{follow}.time_steps"
+    ]  # fmt: skip
 
 
 def test_a_robot_of_no_known_kind_gets_signals_and_the_whole_recording(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def read(text: str, path: Path, namespace: str = "") -> dict[str, Setting]:
     if root is None:
         return {}
     settings = {}
-    for leaf in yaml_tree.leaves(root):
+    for leaf in yaml_tree.leaves(root, letters=True):
         where = f"{path}:{leaf.line}"
         if PARAMETERS not in leaf.keys[1:-1]:
             hint = f"A parameter file has NODE: {PARAMETERS}: NAME: VALUE."

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
 from care_core import plain_yaml
 from care_core.errors import ConfigError
@@ -29,7 +30,12 @@ _INT_TAG = "tag:yaml.org,2002:int"
 _FLOAT_TAG = "tag:yaml.org,2002:float"
 _LIST_TAG = "tag:yaml.org,2002:seq"
 _BOOL_TAG = "tag:yaml.org,2002:bool"
+_STRING_TAG = "tag:yaml.org,2002:str"
 
+_SWITCHES = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+"""What YAML 1.1, which ROS reads, takes for true and false beside these words."""
+_LETTERS = {"y": "true", "n": "false"}
+"""What the parser of ROS 2 takes for true and false as well (rcl_yaml_param_parser, parse.c), and PyYAML does not."""
 
 DYNAMIC_RECONFIGURE = "dynamic_reconfigure.encoding.Config"
 """Class in the tag of a file that `dynparam dump` wrote."""
@@ -59,13 +65,14 @@ def compose(text: str, path: Path) -> MappingNode | None:
     return node
 
 
-def leaves(root: MappingNode, *, unwrap: str = "") -> Iterator[Leaf]:
+def leaves(root: MappingNode, *, unwrap: str = "", letters: bool = False) -> Iterator[Leaf]:
     """Every value with the keys that lead to it. Nulls and lists of mappings are passed over.
 
     Args:
         unwrap: class in the tag of a dumped Python object, whose values are those under its key `dictitems`.
+        letters: whether y and n are true and false, as ROS 2 has it.
     """
-    return _mapping(root, (), unwrap)
+    return _mapping(root, (), unwrap, letters)
 
 
 def is_dumped(node: MappingNode, name: str = DYNAMIC_RECONFIGURE) -> bool:
@@ -73,39 +80,55 @@ def is_dumped(node: MappingNode, name: str = DYNAMIC_RECONFIGURE) -> bool:
     return name in str(node.tag)
 
 
-def _mapping(node: MappingNode, keys: tuple[str, ...], unwrap: str) -> Iterator[Leaf]:
+def _mapping(node: MappingNode, keys: tuple[str, ...], unwrap: str, letters: bool) -> Iterator[Leaf]:
     dumped = bool(unwrap) and is_dumped(node, unwrap)
     for key, value in node.value:
         name = str(key.value).strip("/") or str(key.value)
         if dumped and name == "dictitems" and isinstance(value, MappingNode):
-            yield from _mapping(value, keys, unwrap)
+            yield from _mapping(value, keys, unwrap, letters)
         elif dumped:
             continue
         elif isinstance(value, MappingNode):
-            yield from _mapping(value, (*keys, name), unwrap)
-        elif (plain := plain_value(value)) is not None:
+            yield from _mapping(value, (*keys, name), unwrap, letters)
+        elif (plain := plain_value(value, letters=letters)) is not None:
             yield Leaf((*keys, name), plain, value.start_mark.line + 1)
 
 
-def plain_value(node: Node) -> float | str | None:
+def plain_value(node: Node, *, letters: bool = False) -> float | str | None:
     """A number, text or list as its text; None for nothing, and for what holds mappings."""
     if isinstance(node, ScalarNode) and node.tag != _NULL_TAG:
-        return _scalar(node)
-    return _list(node) if isinstance(node, SequenceNode) and node.tag == _LIST_TAG else None
+        return _scalar(node, letters)
+    return _list(node, letters) if isinstance(node, SequenceNode) and node.tag == _LIST_TAG else None
 
 
-def _list(node: SequenceNode) -> str | None:
+def is_bool(node: Node, *, letters: bool = False) -> bool:
+    """Whether ROS takes a value for true or false."""
+    return isinstance(node, ScalarNode) and (node.tag == _BOOL_TAG or bool(_switch(node, letters)))
+
+
+def _switch(node: ScalarNode, letters: bool) -> str:
+    """true or false for a bare word that ROS takes for one, else nothing. `yEs` is a text, and so is `!!str yes`."""
+    text = str(node.value)
+    if node.tag != _STRING_TAG or node.style or text not in (text.lower(), text.upper(), text.capitalize()):
+        return ""
+    is_tagged = node.end_mark.index - node.start_mark.index != len(text) and not node.anchor
+    words = {**_SWITCHES, **_LETTERS} if letters else _SWITCHES
+    return "" if is_tagged else words.get(text.lower(), "")
+
+
+def _list(node: SequenceNode, letters: bool) -> str | None:
     """A list as its text, `[1.0, 2.0]`; None for one that holds mappings."""
     parts = []
     for item in node.value:
-        part = _list(item) if isinstance(item, SequenceNode) else _item(item) if isinstance(item, ScalarNode) else None
+        is_list = isinstance(item, SequenceNode)
+        part = _list(item, letters) if is_list else _item(item, letters) if isinstance(item, ScalarNode) else None
         if part is None:
             return None
         parts.append(part)
     return f"[{', '.join(parts)}]"
 
 
-def _scalar(node: ScalarNode) -> float | str:
+def _scalar(node: ScalarNode, letters: bool) -> float | str:
     """A number where YAML resolves one, else the text; an integer stays one, since ROS minds the difference."""
     text = str(node.value)
     if node.tag == _BOOL_TAG:
@@ -114,15 +137,23 @@ def _scalar(node: ScalarNode) -> float | str:
     try:
         if node.tag == _INT_TAG:
             return int(plain, 0) if plain.lstrip("+-").startswith(("0x", "0o", "0b")) else int(plain)
-        return float(plain.replace(".inf", "inf").replace(".nan", "nan")) if node.tag == _FLOAT_TAG else text
+        if node.tag == _FLOAT_TAG:
+            return float(plain.replace(".inf", "inf").replace(".nan", "nan"))
     except ValueError:  # an integer of more digits than any number has
         return text
+    return _switch(node, letters) or text
 
 
-def _item(node: ScalarNode) -> str:
-    value = _scalar(node)
-    is_bare = not isinstance(value, str) or node.tag == _BOOL_TAG or _BARE.fullmatch(value)
-    return str(value) if is_bare else dumps(value)
+def _item(node: ScalarNode, letters: bool) -> str:
+    value = _scalar(node, letters)
+    if not isinstance(value, str) or is_bool(node, letters=letters):
+        return str(value)
+    return value if _BARE.fullmatch(value) and not _is_switch(value) else dumps(value)
+
+
+def _is_switch(text: str) -> bool:
+    """Whether a text would be read as true or false without its quotes."""
+    return text.lower() in (*_SWITCHES, *_LETTERS, "true", "false")
 
 
 def plain(value: float | str) -> Any:
@@ -137,7 +168,7 @@ def plain(value: float | str) -> Any:
         except plain_yaml.PlainYamlError:
             return value
         return items if isinstance(items, list) else value
-    return value
+    return DoubleQuotedScalarString(value) if _is_switch(value) else value
 
 
 def typed(text: str) -> float | str:

@@ -1,0 +1,154 @@
+"""Rules for the plugins of Nav2: the names that load them by release, and critics of another controller."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+
+from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
+from care_core.lint.generic import problem_at
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.scopes import Keys, class_of, split, words_of
+from care_core.metadata import plugins
+from care_core.metadata.navigation import spans
+
+_NAMING = ("plugin", "primary_controller")
+"""Keys whose value is the name of a plugin."""
+_ALIKE = 0.85
+_CONTROLLERS = {"DWBLocalPlanner": plugins.DWB_CRITICS, "MPPIController": plugins.MPPI_CRITICS}
+"""Controllers that weigh trajectories by critics, and of which kind these are."""
+_WITHOUT = ("RegulatedPurePursuitController", "GracefulController")
+_LOADS = {
+    "DWBLocalPlanner": "dwb_local_planner.cpp looks for critics in dwb_critics, with Critic added to their name",
+    "MPPIController": "critic_manager.cpp looks for critics in mppi::critics alone",
+}
+
+
+def check(file: ConfigFile, distribution: str) -> Iterator[Problem]:
+    """What is wrong with the plugins that a ROS 2 file names.
+
+    Args:
+        distribution: what the file is for; empty where nobody says so.
+    """
+    values = {split(entry): entry for entry in file.entries}
+    named = [entry for keys, entry in values.items() if PARAMETERS in keys and keys[-1] in _NAMING]
+    yield from _names(file, named, distribution)
+    yield from _critics(file, values)
+
+
+def _names(file: ConfigFile, named: list[Entry], distribution: str) -> Iterator[Problem]:
+    known: list[tuple[Entry, frozenset[str]]] = []
+    for entry in named:
+        name = str(entry.value)
+        releases = plugins.releases_of(name)
+        if not releases:
+            yield from _never(file, entry, name)
+        elif distribution and distribution not in releases:
+            yield _elsewhere(file, entry, name, releases, distribution)
+        else:
+            known.append((entry, releases))
+    if not distribution:
+        yield from _beside(file, known)
+
+
+def _never(file: ConfigFile, entry: Entry, name: str) -> Iterator[Problem]:
+    """A name that no release has, of a class that there is, or of one that is spelled nearly so."""
+    if plugins.package_of(name) not in plugins.packages():
+        return
+    meant = list(plugins.spellings(name)) or get_close_matches(name, plugins.names(), n=1, cutoff=_ALIKE)
+    if meant:
+        text = f"No release of Nav2 loads a plugin by the name {name}."
+        hint = f"Did you mean {meant[-1]}?"
+        yield problem_at("plugin-name", Severity.ERROR, file, entry, text, hint, plugins.SOURCE)
+
+
+def _elsewhere(file: ConfigFile, entry: Entry, name: str, releases: frozenset[str], distribution: str) -> Problem:
+    now = next((one for one, held in plugins.spellings(name).items() if distribution in held), "")
+    if now:
+        text = f"{name} is {now} in {distribution}, which does not know the other spelling."
+        return problem_at("plugin-name", Severity.ERROR, file, entry, text, f"Write {now}.", plugins.SOURCE)
+    text = f"{name} is a plugin of {spans(releases, 'ros2')}, not of {distribution}"
+    is_asked = plugins.is_loaded_in(name, distribution)
+    text += "." if is_asked else ", which loads none of its kind."
+    severity = Severity.ERROR if is_asked else Severity.WARNING
+    hint = "Is the file for this distribution?"
+    return problem_at("plugin-name", severity, file, entry, text, hint, plugins.SOURCE)
+
+
+def _beside(file: ConfigFile, known: list[tuple[Entry, frozenset[str]]]) -> Iterator[Problem]:
+    """Names that no one release loads together: those off the releases that load most of them."""
+    counts = Counter(release for _, releases in known for release in releases)
+    most = max(counts.values(), default=0)
+    if most == len(known):
+        return
+    usual = frozenset(release for release, count in counts.items() if count == most)
+    for entry, releases in known:
+        if releases & usual:
+            continue
+        name = str(entry.value)
+        now = [one for one, held in plugins.spellings(name).items() if held & usual]
+        own, other = spans(releases, "ros2"), spans(usual, "ros2")
+        text = f"{name} is loaded in {own}, and the other plugins of this file in {other}."
+        hint = f"Write {now[0]}." if now else "No release loads all of them."
+        others = tuple(one.name for one, held in known if not held & releases)
+        yield problem_at("plugin-name", Severity.WARNING, file, entry, text, hint, plugins.SOURCE, others)
+
+
+# Critics
+
+
+def _critics(file: ConfigFile, values: Mapping[Keys, Entry]) -> Iterator[Problem]:
+    for keys, entry in values.items():
+        if keys[-1] != "plugin" or PARAMETERS not in keys:
+            continue
+        here = keys[:-1]
+        handed = values.get((*here, "primary_controller"))
+        owner = class_of(str((handed or entry).value))
+        if owner in _CONTROLLERS:
+            yield from _listed(file, values, here, owner)
+        if owner in _CONTROLLERS or owner in _WITHOUT:
+            yield from _parts(file, values, here, owner)
+
+
+def _listed(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
+    """Critics of the other controller in the list of those that are to be loaded."""
+    entry = values.get((*here, "critics"))
+    if entry is None or (*here, "default_critic_namespaces") in values:
+        return
+    for name in words_of(entry):
+        other = _of_other(name, owner)
+        if other and (*here, name, "class") not in values:
+            text = f"{name} is a critic of {other}, not of {owner}: the controller does not load."
+            hint = f"Leave it out, or load {other}."
+            yield problem_at("plugin-name", Severity.ERROR, file, entry, text, hint, _LOADS[owner])
+
+
+def _parts(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
+    """Parameters of critics that the controller does not have, once for each critic."""
+    seen: set[str] = set()
+    listed = words_of(values.get((*here, "critics")))
+    for keys, entry in values.items():
+        if len(keys) < len(here) + 2 or keys[: len(here)] != here:
+            continue
+        name = keys[len(here)]
+        other = _of_other(name, owner)
+        if other and name not in seen and name not in listed:
+            seen.add(name)
+            text = f"{name} is a critic of {other}, not of {owner}: nothing reads this part."
+            hint = f"Leave it out, or load {other}."
+            source = _LOADS.get(owner, f"the sources of {owner} name no critics")
+            yield problem_at("misplaced-key", Severity.WARNING, file, entry, text, hint, source)
+
+
+def _of_other(name: str, owner: str) -> str:
+    """The other controller, where a critic is its alone."""
+    if _is_critic(name, _CONTROLLERS.get(owner, "")):
+        return ""
+    return next((one for one, kind in _CONTROLLERS.items() if one != owner and _is_critic(name, kind)), "")
+
+
+def _is_critic(name: str, kind: str) -> bool:
+    """DWB adds the word Critic to the name of one that lacks it; MPPI does not."""
+    full = name if kind != plugins.DWB_CRITICS or "Critic" in name else f"{name}Critic"
+    return full in plugins.classes(kind)

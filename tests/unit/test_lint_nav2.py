@@ -1,0 +1,319 @@
+"""What is wrong with parameter files of Nav2: limits and their signs, lists, plugins by release, what Nav2 ships."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from care_core.lint.linting import lint
+from care_core.lint.problems import Problem, Severity
+from care_core.metadata import plugins
+
+
+def findings(tmp_path: Path, text: str, target: str = "") -> tuple[Problem, ...]:
+    path = tmp_path / "nav2.yaml"
+    path.write_text(text)
+    (linted,) = lint([str(path)], target)
+    return linted.problems
+
+
+def told(tmp_path: Path, text: str, target: str = "") -> list[tuple[str, str, str]]:
+    return [
+        (one.rule, one.severity.value, one.parameter.rpartition("/")[2]) for one in findings(tmp_path, text, target)
+    ]
+
+
+def node(name: str, *lines: str) -> str:
+    return "\n".join([f"{name}:", "  ros__parameters:", *(f"    {line}" for line in lines), ""])
+
+
+def controller(plugin: str, *lines: str) -> str:
+    inner = [f"  plugin: {plugin}", *(f"  {line}" for line in lines)]
+    return node("controller_server", "controller_plugins: [FollowPath]", "FollowPath:", *inner)
+
+
+DWB, MPPI = "dwb_core::DWBLocalPlanner", "nav2_mppi_controller::MPPIController"
+RPP = "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"
+
+
+def test_a_class_in_braces_needs_no_quotes(tmp_path: Path) -> None:
+    line = "GridBased: {plugin: nav2_navfn_planner::NavfnPlanner, use_astar: no, tolerance: 0.5}"
+    assert told(tmp_path, node("planner_server", "planner_plugins: [GridBased]", line)) == []
+    assert told(tmp_path, "a: {b: c::d\n")[0][:2] == ("syntax", "error")
+
+
+@pytest.mark.parametrize("word", ["no", "No", "NO", "off", "Off", "n", "N", "false", "yes", "On", "y", "Y", "TRUE"])
+def test_the_words_that_rcl_takes_for_a_switch_are_one(tmp_path: Path, word: str) -> None:
+    planner = node("planner_server", "planner_plugins: [GridBased]", "GridBased:",
+                   "  plugin: nav2_navfn_planner::NavfnPlanner", f"  use_astar: {word}")  # fmt: skip
+    assert told(tmp_path, planner) == []
+
+
+@pytest.mark.parametrize("word", ["nO", "oFf", "'no'", '"off"', "!!str no", "nope"])
+def test_words_that_rcl_takes_for_texts_are_no_switch(tmp_path: Path, word: str) -> None:
+    planner = node("planner_server", "planner_plugins: [GridBased]", "GridBased:",
+                   "  plugin: nav2_navfn_planner::NavfnPlanner", f"  use_astar: {word}")  # fmt: skip
+    assert told(tmp_path, planner) == [("wrong-type", "error", "use_astar")]
+
+
+def test_ros_1_takes_no_and_off_for_a_switch_and_not_the_letter(tmp_path: Path) -> None:
+    assert told(tmp_path, "DWAPlannerROS:\n  sim_time: 1.7\n  max_vel_x: 0.5\n  prune_plan: off\n") == []
+    assert told(tmp_path, "DWAPlannerROS:\n  sim_time: 1.7\n  max_vel_x: 0.5\n  prune_plan: n\n")[0][0] == "wrong-type"
+
+
+@pytest.mark.parametrize(
+    ("plugin", "line", "rule"),
+    [
+        (DWB, "min_vel_x: 0.1", "hinders"),
+        (DWB, "min_vel_x: -0.1", ""),
+        (DWB, "max_vel_x: -0.1", "cannot-work"),
+        (DWB, "max_vel_y: -0.2", "hinders"),
+        (DWB, "min_vel_y: 0.2", "hinders"),
+        (DWB, "acc_lim_x: -2.5", "cannot-work"),
+        (DWB, "acc_lim_y: 0.0", ""),
+        (DWB, "acc_lim_y: -1.0", "cannot-work"),
+        (DWB, "decel_lim_x: 2.5", "cannot-work"),
+        (DWB, "decel_lim_y: 2.5", "cannot-work"),
+        (DWB, "decel_lim_theta: 3.2", "cannot-work"),
+        (DWB, "max_speed_xy: -1.0", ""),
+        (MPPI, "vx_min: 0.1", "hinders"),
+        (MPPI, "vx_min: -0.35", ""),
+        (MPPI, "vx_max: -0.5", "cannot-work"),
+        (MPPI, "vy_max: -0.5", "cannot-work"),
+        (MPPI, "wz_max: -1.9", "cannot-work"),
+        (MPPI, "ax_max: -3.0", "cannot-work"),
+        (MPPI, "ax_min: 3.0", "contradiction"),
+        (MPPI, "ay_min: 3.0", "contradiction"),
+        (RPP, "desired_linear_vel: -0.5", "cannot-work"),
+        (RPP, "rotate_to_heading_angular_vel: -1.8", "cannot-work"),
+        (RPP, "max_angular_accel: 0.0", "cannot-work"),
+        (RPP, "lookahead_time: -1.5", "cannot-work"),
+        (RPP, "min_approach_linear_velocity: -0.05", "contradiction"),
+        (RPP, "min_approach_linear_velocity: 0.05", ""),
+    ],
+)
+def test_limits_with_the_wrong_sign_are_found(tmp_path: Path, plugin: str, line: str, rule: str) -> None:
+    found = told(tmp_path, controller(plugin, line))
+    assert found == ([(rule, "warning", line.partition(":")[0])] if rule else [])
+
+
+def test_a_speed_of_turning_counts_where_the_controller_turns(tmp_path: Path) -> None:
+    lines = ("rotate_to_heading_angular_vel: 0.0", "use_rotate_to_heading: {}")
+    assert told(tmp_path, controller(RPP, lines[0], lines[1].format("true"))) != []
+    assert told(tmp_path, controller(RPP, lines[0], lines[1].format("false"))) == []
+
+
+def test_a_top_speed_above_the_speed_that_dwb_allows(tmp_path: Path) -> None:
+    assert told(tmp_path, controller(DWB, "max_vel_x: 0.5", "max_speed_xy: 0.3")) == [
+        ("contradiction", "warning", "max_vel_x")
+    ]
+    for allowed in ("0.5", "-1.0"):
+        assert told(tmp_path, controller(DWB, "max_vel_x: 0.5", f"max_speed_xy: {allowed}")) == []
+
+
+SMOOTHER = {
+    "max_velocity": "[0.5, 0.0, 2.5]", "min_velocity": "[-0.5, 0.0, -2.5]", "max_accel": "[0.3, 0.0, 3.2]",
+    "max_decel": "[-0.5, 0.0, -3.2]", "deadband_velocity": "[0.0, 0.0, 0.0]",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changed", "wrong"),
+    [
+        ({}, []),
+        ({"max_velocity": "[0.5, 2.5]"}, ["max_velocity"]),
+        ({"deadband_velocity": "[0.0, 0.0, 0.0, 0.0]"}, ["deadband_velocity"]),
+        ({"max_accel": "[-0.3, 0.0, 3.2]"}, ["max_accel"]),
+        ({"max_decel": "[0.5, 0.0, 3.2]"}, ["max_decel"]),
+        ({"min_velocity": "[0.5, 0.0, -2.5]"}, ["min_velocity"]),
+        ({"max_velocity": "[0.5, -0.1, 2.5]"}, ["max_velocity"]),
+        ({name: f"[{', '.join(['0.0' if name[:2] != 'ma' else '-0.5' if 'dec' in name else '0.5'] * 6)}]"
+          for name in SMOOTHER}, []),
+        ({"max_velocity": "[0.5, 0.0, 0.0, 0.0, 0.0, 2.5]"}, ["max_velocity"]),
+    ],
+)  # fmt: skip
+def test_lists_of_the_velocity_smoother_that_it_refuses(
+    tmp_path: Path, changed: dict[str, str], wrong: list[str]
+) -> None:
+    lines = [f"{name}: {value}" for name, value in {**SMOOTHER, **changed}.items()]
+    found = told(tmp_path, node("velocity_smoother", *lines))
+    assert found == [("cannot-work", "error", name) for name in wrong]
+
+
+def costmap(*lines: str, name: str = "global_costmap") -> str:
+    return f"{name}:\n  {node(name, *lines)}".replace("\n", "\n  ")
+
+
+FOOTPRINT = 'footprint: "[[0.3, 0.2], [0.3, -0.2], [-0.3, -0.2], [-0.3, 0.2]]"'
+
+
+@pytest.mark.parametrize(
+    ("lines", "severity"),
+    [
+        (("robot_radius: 0.22", FOOTPRINT), "note"),
+        (("robot_radius: 0.1", FOOTPRINT), "warning"),
+        (("robot_radius: 0.22", 'footprint: "[]"'), ""),
+        (("robot_radius: 0.22",), ""),
+        ((FOOTPRINT,), ""),
+    ],
+)
+def test_a_radius_beside_a_footprint_is_not_used(tmp_path: Path, lines: tuple[str, ...], severity: str) -> None:
+    found = told(tmp_path, costmap(*lines))
+    assert found == ([("dead-key", severity, "robot_radius")] if severity else [])
+
+
+@pytest.mark.parametrize(
+    ("source", "key"),
+    [
+        ("clearing: true, raytrace_max_range: 2.0", "raytrace_max_range"),
+        ("clearing: true, obstacle_max_range: 4.0", "obstacle_max_range"),
+        ("clearing: true, obstacle_max_range: 4.0, raytrace_max_range: 3.5", "raytrace_max_range"),
+        ("clearing: true, obstacle_max_range: 4.0, raytrace_max_range: 5.0", ""),
+        ("clearing: true, marking: false, obstacle_max_range: 4.0", ""),
+        ("clearing: true, raytrace_max_range: 2.5", ""),
+    ],
+)
+def test_what_is_marked_farther_than_it_is_cleared(tmp_path: Path, source: str, key: str) -> None:
+    layer = ("plugins: [obstacle_layer]", "obstacle_layer:", "  plugin: nav2_costmap_2d::ObstacleLayer",
+             "  observation_sources: scan", f"  scan: {{topic: /scan, {source}}}")  # fmt: skip
+    found = [one for one in told(tmp_path, costmap(*layer)) if one[0] == "contradiction"]
+    assert found == ([("contradiction", "warning", key)] if key else [])
+
+
+def planner(plugin: str) -> str:
+    return node("planner_server", "planner_plugins: [GridBased]", "GridBased:", f"  plugin: {plugin}")
+
+
+@pytest.mark.parametrize(
+    ("plugin", "target", "hint"),
+    [
+        ("nav2_navfn_planner/NavfnPlanner", "humble", ""),
+        ("nav2_navfn_planner/NavfnPlanner", "iron", ""),
+        ("nav2_navfn_planner::NavfnPlanner", "jazzy", ""),
+        ("nav2_navfn_planner/NavfnPlanner", "", ""),
+        ("nav2_navfn_planner/NavfnPlanner", "jazzy", "Write nav2_navfn_planner::NavfnPlanner."),
+        ("nav2_navfn_planner::NavfnPlanner", "humble", "Write nav2_navfn_planner/NavfnPlanner."),
+        ("nav2_smac_planner::SmacPlannerHybrid", "iron", "Write nav2_smac_planner/SmacPlannerHybrid."),
+        ("nav2_smac_planner/SmacPlannerLattice", "galactic", "Is the file for this distribution?"),
+        ("my_planner/NavfnPlanner", "jazzy", ""),
+    ],
+)
+def test_plugins_have_the_name_of_their_release(tmp_path: Path, plugin: str, target: str, hint: str) -> None:
+    found = findings(tmp_path, planner(plugin), target)
+    assert [(one.rule, one.severity, one.hint) for one in found] == (
+        [("plugin-name", Severity.ERROR, hint)] if hint else []
+    )
+
+
+def test_a_plugin_of_a_kind_that_the_release_does_not_load_stops_no_node(tmp_path: Path) -> None:
+    text = node("bt_navigator", "navigators: [to_pose]", "to_pose:",
+                "  plugin: nav2_bt_navigator/NavigateToPoseNavigator")  # fmt: skip
+    assert told(tmp_path, text, "iron") == []
+    assert ("plugin-name", "warning", "plugin") in told(tmp_path, text, "humble")
+    assert ("plugin-name", "error", "plugin") in told(tmp_path, text, "jazzy")
+
+
+@pytest.mark.parametrize(
+    ("plugin", "hint"),
+    [
+        ("nav2_mppi_controller/MPPIController", "Did you mean nav2_mppi_controller::MPPIController?"),
+        ("nav2_mppi_controller::MPPIControler", "Did you mean nav2_mppi_controller::MPPIController?"),
+        ("dwb_core/DWBLocalPlanner", "Did you mean dwb_core::DWBLocalPlanner?"),
+        ("nav2_controller_of_mine::Controller", ""),
+    ],
+)
+def test_a_plugin_that_no_release_loads(tmp_path: Path, plugin: str, hint: str) -> None:
+    found = [one for one in findings(tmp_path, controller(plugin)) if one.rule == "plugin-name"]
+    assert [(one.severity, one.hint) for one in found] == ([(Severity.ERROR, hint)] if hint else [])
+
+
+def test_plugins_of_two_releases_in_one_file(tmp_path: Path) -> None:
+    behaviors = node("behavior_server", "behavior_plugins: [spin, wait]", "spin:", "  plugin: nav2_behaviors::Spin",
+                     "wait:", "  plugin: nav2_behaviors::Wait")  # fmt: skip
+    (found,) = findings(tmp_path, planner("nav2_navfn_planner/NavfnPlanner") + behaviors)
+    assert (found.rule, found.severity, found.line) == ("plugin-name", Severity.WARNING, 5)
+    assert found.hint == "Write nav2_navfn_planner::NavfnPlanner."
+    assert len(found.others) == 2
+    assert findings(tmp_path, planner("nav2_navfn_planner::NavfnPlanner") + behaviors) == ()
+
+
+@pytest.mark.parametrize(
+    ("plugin", "lines", "wanted"),
+    [
+        (MPPI, ("critics: [ConstraintCritic, CostCritic]", "CostCritic: {cost_weight: 3.81}"), []),
+        (DWB, ("critics: [RotateToGoal, PathAlign]", "PathAlign.scale: 32.0"), []),
+        (DWB, ("critics: [PathAlignCritic]", "PathAlignCritic.scale: 32.0"), []),
+        (MPPI, ("critics: [RotateToGoal]",), [("plugin-name", "error", "critics")]),
+        (DWB, ("critics: [CostCritic]",), [("plugin-name", "error", "critics")]),
+        (MPPI, ("BaseObstacle.scale: 0.02", "BaseObstacle.sum_scores: false"),
+         [("misplaced-key", "warning", "BaseObstacle.scale")]),
+        (DWB, ("ConstraintCritic: {cost_weight: 4.0, cost_power: 1}",), [("misplaced-key", "warning", "cost_weight")]),
+        (RPP, ("RotateToGoal.scale: 32.0",), [("misplaced-key", "warning", "RotateToGoal.scale")]),
+        (MPPI, ("max_vel_x: 0.5",), [("misplaced-key", "warning", "max_vel_x")]),
+        (DWB, ("vx_max: 0.5",), [("misplaced-key", "warning", "vx_max")]),
+    ],
+)  # fmt: skip
+def test_keys_and_critics_of_another_controller(
+    tmp_path: Path, plugin: str, lines: tuple[str, ...], wanted: list[tuple[str, str, str]]
+) -> None:
+    assert told(tmp_path, controller(plugin, *lines)) == wanted
+
+
+def checked(stateful: str, checker: str = "") -> str:
+    inner = [f"  {line}" for line in (f"plugin: {DWB}", f"stateful: {stateful}")]
+    goal = ["  plugin: nav2_controller::SimpleGoalChecker", *([f"  stateful: {checker}"] if checker else [])]
+    return node("controller_server", "goal_checker_plugins: [general_goal_checker]", "general_goal_checker:", *goal,
+                "controller_plugins: [FollowPath]", "FollowPath:", *inner)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("stateful", "checker", "is_wrong"),
+    [
+        ("true", "true", False),
+        ("true", "", False),
+        ("false", "false", False),
+        ("false", "", True),
+        ("true", "no", True),
+    ],
+)
+def test_stateful_of_a_controller_is_said_to_be_the_goal_checkers(
+    tmp_path: Path, stateful: str, checker: str, is_wrong: bool
+) -> None:
+    found = findings(tmp_path, checked(stateful, checker))
+    assert [(one.rule, one.hint) for one in found] == (
+        [("misplaced-key", f"Write stateful: {stateful} under general_goal_checker, or leave it out.")]
+        if is_wrong
+        else []
+    )
+
+
+def test_what_nav2_ships_and_nothing_reads_is_told_once_it_is_changed(tmp_path: Path) -> None:
+    docking = ("controller:", "  simulation_step: {}")
+    assert told(tmp_path, node("docking_server", docking[0], docking[1].format("0.1"))) == []
+    (found,) = findings(tmp_path, node("docking_server", docking[0], docking[1].format("0.05")))
+    assert (found.rule, found.hint) == ("unknown-key", "Did you mean simulation_time_step?")
+    spare = ("plugins: [inflation_layer]", "static_layer:", "  plugin: nav2_costmap_2d::StaticLayer")
+    assert told(tmp_path, costmap(*spare, name="local_costmap")) == []
+    assert told(tmp_path, costmap(*spare)) == [("not-loaded", "note", "plugin")]
+
+
+@pytest.mark.parametrize("target", ["", "lyrical", "rolling"])
+def test_the_file_that_nav2_brings_has_no_finding(recorded: Path, target: str) -> None:
+    (linted,) = lint([str(recorded / "logs" / "configs" / "nav2" / "nav2_bringup_nav2_params.yaml")], target)
+    assert linted.problems == ()
+
+
+def test_distributions_with_a_gap_are_told_with_it(tmp_path: Path) -> None:
+    (found,) = findings(tmp_path, controller("nav2_graceful_controller::GracefulController"), "iron")
+    assert (
+        found.text
+        == "nav2_graceful_controller::GracefulController is a plugin of humble, jazzy to rolling, not of iron."
+    )
+
+
+def test_every_plugin_of_the_table_is_of_a_release_and_spelled_one_way_in_it() -> None:
+    for name in plugins.names():
+        assert plugins.releases_of(name)
+        others = [held for one, held in plugins.spellings(name).items() if one != name]
+        assert not any(held & plugins.releases_of(name) for held in others), name
