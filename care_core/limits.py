@@ -32,6 +32,8 @@ DEFINITION_BYTES = MEBIBYTE
 TOPIC_DEFINITIONS = 500
 """Different ones that are compiled for one reading; a robot publishes some 100 types."""
 
+EVENT_TEXTS_BYTES = 8 << 20
+"""Of the texts of a log's events, unpacked; those of PX4 v1.16 take 0.2 MB."""
 ULOG_TOPICS = 4_096
 """Subscriptions of a ULog; a vehicle logs some 200."""
 TEXT_MESSAGE_TYPES = 1_000

@@ -1,14 +1,15 @@
 """PX4 logs (.ulg): a header, declarations of topics, and a chain of records without checksums.
 
-Topics are channels; further instances of one are `TOPIC#1`, `TOPIC#2`. What the firmware said in words is the channel
-`logged_messages`. Only what is asked for is decoded. Source: the ULog file format,
-docs.px4.io/main/en/dev_log/ulog_file_format.html.
+Topics are channels; further instances of one are `TOPIC#1`, `TOPIC#2`. What the firmware said, in words or as an event
+with its text in the log, is the channel `logged_messages`. Only what is asked for is decoded. Source: the ULog file
+format, docs.px4.io/main/en/dev_log/ulog_file_format.html.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timezone
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
-from care_core.logs import formats
+from care_core.logs import formats, px4_events
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import BACK_S, PAUSE_S, STEP_S, find_clock
 from care_core.logs.damage import summarised
@@ -56,6 +57,11 @@ _EARLIEST_S = datetime(2005, 1, 1, tzinfo=timezone.utc).timestamp()
 _LATEST_S = 1e10
 _SAMPLES = 64
 """Rows of a GPS topic that are looked at first for one that knows the time."""
+_ATTENTION = LEVELS.index("WARNING")
+"""Events of lesser levels say what else is logged: that it climbs, that it armed."""
+_TOGETHER_S = 1.0
+"""Within it an event and a logged string are the same."""
+_NO_WORD = re.compile(r"\W+|preflight fail|arming check")
 _NEAR = 100
 """Messages ahead of a place among which the latest tells its time: several tasks write into one log."""
 
@@ -104,8 +110,8 @@ class Px4Log:
         unread: list[Damage] = []
         self._info = _keyed(contents.others, INFO, unread)
         self._settings = self._history(contents, times, unread)
-        self._words = self._spoken(contents.others)
         self._multiple = [one for one in contents.others if one.kind == INFO_MULTIPLE]
+        self._words = self._spoken(contents.others)
         misfits = [Damage("a message fits no declaration", byte) for byte in contents.misfits]
         broken = (
             *summarised(contents.damage, "damaged places"),
@@ -222,19 +228,66 @@ class Px4Log:
         return {name: tuple(values) for name, values in known.items() if values}
 
     def _spoken(self, others: Iterable[Other]) -> Table:
-        said = []
+        """What was said in words, and the events that say what no words did."""
+        said = list(self._logged_strings(others))
+        words = [(_bare(one.text), one.t) for one in said]
+        said += (one for one in self._events() if not _is_told(one, words))
+        said.sort(key=lambda one: one.t)
+        t = np.array([one.t for one in said], dtype=np.float64)
+        columns = {"level": [one.level for one in said], "message": [one.text for one in said]}
+        spoken = Table(t, {name: np.array(texts, dtype=object) for name, texts in columns.items()})
+        return spoken.where(t <= self.duration_s + 1.0)
+
+    def _logged_strings(self, others: Iterable[Other]) -> Iterator[_Said]:
+        strings = []
         for one in others:
             at = {TEXT: 1, TAGGED_TEXT: 3}.get(one.kind, 0)
             if at:
                 stamp_us = int.from_bytes(one.body[at : at + 8], "little")
-                level = one.body[0] - ord("0")
-                named = LEVELS[level] if 0 <= level < len(LEVELS) else "UNKNOWN"
-                said.append((stamp_us, one.kind, named, one.body[at + 8 :].decode("utf-8", "replace").rstrip("\0")))
-        said.sort(key=lambda one: one[:2])
-        t = self._seconds(np.array([one[0] for one in said], dtype=np.float64))
-        columns = {"level": [one[2] for one in said], "message": [one[3] for one in said]}
-        words = Table(t, {name: np.array(texts, dtype=object) for name, texts in columns.items()})
-        return words.where(t <= self.duration_s + 1.0)
+                text = one.body[at + 8 :].decode("utf-8", "replace").rstrip("\0")
+                strings.append((stamp_us, one.kind, one.body[0] - ord("0"), text))
+        strings.sort(key=lambda one: one[:2])
+        t = self._seconds(np.array([one[0] for one in strings], dtype=np.float64))
+        for at_s, (_, _, level, text) in zip(t.tolist(), strings, strict=True):
+            yield _Said(at_s, LEVELS[level] if 0 <= level < len(LEVELS) else "UNKNOWN", text)
+
+    def _events(self) -> Iterator[_Said]:
+        """What was said as events, where the log has their texts."""
+        own, texts = self._channels.get(px4_events.TOPIC), self._event_texts()
+        if own is None or texts is None:
+            return
+        table = self._tables({"": (own, px4_events.FIELDS)})[""]
+        if set(px4_events.FIELDS) - table.columns.keys():
+            return
+        numbers = np.column_stack([table[name] for name in px4_events.FIELDS]).astype(np.int64).tolist()
+        for t, (number, levels, *arguments) in zip(table.t.tolist(), numbers, strict=True):
+            level = levels & 15  # for whoever is not on board; the other half is for the vehicle's own log
+            text = texts.text(number, bytes(arguments)) if level <= _ATTENTION else ""
+            if text:
+                yield _Said(t, LEVELS[level], text)
+
+    def _event_texts(self) -> px4_events.EventTexts | None:
+        parts = self.multiple.get("metadata_events", ((self._info.get("metadata_events", b""),),))[0]
+        return px4_events.EventTexts.parse(b"".join(part for part in parts if isinstance(part, bytes)))
+
+
+class _Said(NamedTuple):
+    """What the firmware said: seconds of the log, one of `LEVELS`, and the text."""
+
+    t: float
+    level: str
+    text: str
+
+
+def _bare(text: str) -> str:
+    """The letters and digits of a text that say something, to hold two wordings against each other."""
+    return _NO_WORD.sub("", text.casefold())
+
+
+def _is_told(event: _Said, words: Iterable[tuple[str, float]]) -> bool:
+    """Whether a logged string says the same at that time."""
+    own = _bare(event.text)
+    return any(abs(t - event.t) < _TOGETHER_S and own in text for text, t in words)
 
 
 class _Times:
