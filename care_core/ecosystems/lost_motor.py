@@ -145,7 +145,7 @@ def weakened(commands: Commands, flown: NDArray[np.bool_]) -> Weakened | None:
     first = int(np.argmax(mine))
     before = excess[row][at < at[first] - _WINDOW_S]
     after = excess[row][first:]
-    if not mine.any() or mine[first:].mean() < _STAYS or at[-1] - at[first] < _WINDOW_S or len(before) < width:
+    if not mine.any() or mine[first:].mean() < _STAYS or at[-1] - at[first] < _WINDOW_S or 2 * len(before) < width:
         return None
     if float(np.max(before)) > _BEFORE * float(median(after)):
         return None

@@ -15,7 +15,7 @@ from care_core.profile.schema import Schema
 from care_core.records import Record, Struct, field, replace
 from care_core.run import Run, Unavailable, is_known
 from care_core.scaffold.inputs import InputLog
-from care_core.variables import Extract, Role, Threshold, Variable
+from care_core.variables import Extract, Role, Variable
 
 _NUMBERS = ("Float32", "Float64", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64")
 _SIGNALS: Mapping[str, tuple[tuple[str, str, Role, str], ...]] = {
@@ -142,13 +142,8 @@ def _is_same(a: Extract | None, b: Extract | None) -> bool:
 
 def _objectives_of(kind: str) -> Iterator[Variable]:
     """What any recording can be judged by, where the kind of mission brings no objectives of its own."""
-    if kind not in ("recording", "px4_flight"):
-        return
     if kind != "recording":
-        yield Variable(
-            "mission_success", Role.OBJECTIVE, "bool", doc="took off, no crash, no failsafe, landed, disarmed",
-            kind="functional", threshold=Threshold("==", 1), extract=Extract("outcome"),
-        )  # fmt: skip
+        return
     yield Variable(
         "mission_time", Role.OBJECTIVE, unit="s", doc="length of the mission", kind="non-functional",
         extract=Extract("recorded_time"), order=1,

@@ -77,8 +77,9 @@ def test_what_is_not_known_says_nothing() -> None:
 
 @pytest.mark.parametrize(
     "metadata",
-    [b"", b"nothing packed", lzma.compress(b"[]"), lzma.compress(b"{}"), lzma.compress(b'{"components": {"a": {"enums": {"x": {}}}}}'),
-     lzma.compress(b"[" * 100_000), events(default={7: ("hello", ["no_type_t"])}), events()[:200]],
+    [b"", b"nothing packed", lzma.compress(b"[]"), lzma.compress(b"{}"),
+     lzma.compress(b'{"components": {"a": {"enums": {"x": {}}}}}'), lzma.compress(b"[" * 100_000),
+     events(default={7: ("hello", ["no_type_t"])}), events()[:200]],
     ids=["none", "not packed", "a list", "no components", "no namespace", "deep", "an unknown type", "cut"],
 )  # fmt: skip
 def test_texts_that_cannot_be_read_are_none(metadata: bytes) -> None:

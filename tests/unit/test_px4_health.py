@@ -204,7 +204,7 @@ def test_every_field_that_is_read_is_in_the_dictionary() -> None:
         f"{topic}.{name}"
         for topic, fields in reads().items()
         for name in fields
-        if find_field(MESSAGES, topic, name) is None
+        if find_field(MESSAGES, topic.partition("#")[0], name) is None
     }
     assert not unknown
 
@@ -212,3 +212,67 @@ def test_every_field_that_is_read_is_in_the_dictionary() -> None:
 def test_a_former_name_means_what_todays_does() -> None:
     assert find_field(MESSAGES, "sensor_gps", "lat") == find_field(MESSAGES, "sensor_gps", "latitude_deg")
     assert find_field(MESSAGES, "sensor_gps", "nonsense") is None
+
+
+def found_in(topics: Mapping[str, Table], **settings: float) -> list[tuple[str, str, float]]:
+    """Kind, title and onset of what is found in a flight with these topics."""
+    parameters = {name: (Setting(name, value, "PX4 parameters"),) for name, value in settings.items()}
+    log = MadeLog({"vehicle_status": FLOWN, **topics}, parameters=parameters)
+    return [(one.kind, one.title, round(one.onset_s, 1)) for one in examine(Px4Flight(log)).findings]
+
+
+def test_vibration_counts_where_it_lasts() -> None:
+    def shaken(force: float, rate: float, until_s: float) -> list[tuple[str, str, float]]:
+        return found_in({"vehicle_imu_status": states(
+            accel_vibration_metric=[(0, 0.3), (30, force), (until_s, 0.3)],
+            gyro_vibration_metric=[(0, 0.02), (30, rate), (until_s, 0.02)],
+        )})  # fmt: skip
+
+    assert shaken(25.0, 0.02, 40.0) == [("vibration", "strong vibration", 28.5)]
+    assert shaken(0.3, 0.9, 40.0) == [("imu", "noisy gyros", 28.5)]
+    assert shaken(9.0, 0.5, 40.0) == []
+    assert shaken(80.0, 5.0, 31.0) == [], "a hard landing"
+
+
+def test_a_barometer_is_held_against_what_it_was_before_arming() -> None:
+    def heard(after_m: float) -> list[tuple[str, str, float]]:
+        t = np.arange(0.0, 60.0, 0.1)
+        noise_m = np.where(t < 20.0, 0.1, after_m)
+        height = 100.0 + noise_m * np.random.default_rng(0).standard_normal(len(t))
+        return found_in({"vehicle_air_data": Table(t, {"baro_alt_meter": height})})
+
+    ((kind, title, onset_s),) = heard(2.0)
+    assert (kind, title) == ("barometer", "the barometer is noisy")
+    assert 20.0 <= onset_s <= 23.0
+    assert heard(0.2) == []
+
+
+QUAD = {f"CA_ROTOR{n}_P{axis}": at for n, (x, y) in enumerate(((1, 1), (-1, -1), (1, -1), (-1, 1)))
+        for axis, at in (("X", float(x)), ("Y", float(y)))} | {"CA_ROTOR_COUNT": 4.0}  # fmt: skip
+
+
+def test_a_fall_without_a_blow_names_the_motor_that_gave_way() -> None:
+    def fallen(lies: bool) -> list[str]:
+        t = np.arange(0.0, 60.0, 0.1)
+        z = np.interp(t, [0, 12, 20, 30, 32, 60], [0, 0, -10, -10, 0, 0 if lies else -12])
+        vz = np.gradient(z, 0.1)
+        motors = {f"control[{n}]": [(0, 0.0), (10, 0.5), (29.5, 1.0 if n == 2 else 0.4)] for n in range(4)}
+        return [title for _, title, _ in found_in({
+            "vehicle_local_position": Table(t, {"z": z, "vz": vz}),
+            "actuator_motors": states(**motors),
+        }, **QUAD)]  # fmt: skip
+
+    assert fallen(lies=True) == ["motor 3 (front left) gave no thrust"]
+    assert "it hit the ground" not in " ".join(fallen(lies=False)), "it climbed again"
+
+
+def test_the_bare_denial_is_told_only_where_nothing_else_is() -> None:
+    def refused(*said: str) -> list[str]:
+        status = states(arming_state=[(0, 1)], nav_state=[(0, 4)])
+        spoken = words(*((float(n), "WARNING", text) for n, text in enumerate(said)))
+        health = examine(Px4Flight(MadeLog({"vehicle_status": status, "logged_messages": spoken})))
+        return [one.title for one in health.findings]
+
+    denied = "[commander] Arming denied: Resolve system health failures first"
+    assert refused("Arming check: Gyro 1 missing", denied) == ["not ready to fly: Gyro 1 missing"]
+    assert refused(denied) == ["not ready to fly: Arming denied: Resolve system health failures first"]

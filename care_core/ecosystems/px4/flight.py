@@ -57,7 +57,9 @@ _IDLE_S = 60.0
 _MARKS = re.compile(r"\x1b?\[\d+m")
 _SPEAKER = re.compile(r"^\[\w+\]\s*")
 _ARMED_BY = re.compile(r"\[commander\] (?:Armed|Disarmed) (by .+)")
-_PREFLIGHT = re.compile(r"Preflight|Arming check|Not ready|arming denied", re.IGNORECASE)
+_PREFLIGHT = re.compile(
+    r"Preflight|Arming check|Not ready|arming denied|Mission rejected|Geofence violation for waypoint", re.IGNORECASE
+)
 _NOT_READY = re.compile(r"^(?:Not ready to fly|Arming check|Preflight(?: Fail)?): ?", re.IGNORECASE)
 _KILLED = re.compile(r"\bKill(?:[- ]?switch)? engaged", re.IGNORECASE)
 """What the commander says of the kill switch, then and now (Commander.cpp)."""

@@ -103,6 +103,10 @@ MESSAGES: Dictionary = {
         "baro_alt_meter": Field("m", "height by the barometer"),
         "baro_pressure_pa": Field("Pa", "air pressure"),
     }),
+    "vehicle_imu_status": Message({
+        "accel_vibration_metric": Field("m/s2", "vibration of the accelerometers"),
+        "gyro_vibration_metric": Field("rad/s", "vibration of the gyros"),
+    }),
     "vehicle_magnetometer": Message(_along("magnetometer_ga", "Gauss", "magnetic field")),
     "distance_sensor": Message({"current_distance": Field("m", "range")}),
     "airspeed": Message({"indicated_airspeed_m_s": Field("m/s", "indicated airspeed")}),

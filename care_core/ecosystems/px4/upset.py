@@ -14,7 +14,7 @@ from care_core.logs.base import Wanted, merge_needs
 
 _COMBINED = "sensor_combined"
 _FORCES = tuple(f"accelerometer_m_s2[{n}]" for n in range(3))
-READS: Wanted = merge_needs((attitude.READS, {_COMBINED: _FORCES, POSITION: ("z",), LANDED: ("landed",)}))
+READS: Wanted = merge_needs((attitude.READS, {_COMBINED: _FORCES, POSITION: ("z", "vz"), LANDED: ("landed",)}))
 
 LIMITS = Limits()
 LEFT_DEG = LIMITS.add("thrust direction off its demand", 30.0, "deg", "ArduCopter's crash check; PX4 has none")
@@ -30,6 +30,9 @@ _FALLS_S = LIMITS.add("time over which it is taken", 0.5, "s", "a choice: what t
 _SHOCK = LIMITS.add("blow", 30.0, "m/s^2", "three times gravity is no flight")
 _OVER_USUAL = LIMITS.add("blow over what it felt before", 2.0, "", "a choice: vibration is no blow")
 _USUAL_S = LIMITS.add("time before a blow", 4.0, "s", "a choice")
+_GROUND_M = LIMITS.add("height of the ground around where it was armed", 1.5, "m", "a choice: the barometer drifts")
+_LIES_M = LIMITS.add("movement of what lies on the ground", 0.5, "m", "a choice: the estimator still drifts")
+_LIES_S = LIMITS.add("time after a fall in which it lies", 2.0, "s", "a choice: what catches itself climbs again")
 _ENDED_S = LIMITS.add("time in which it is on the ground or disarmed", 10.0, "s", "COM_DISARM_LAND: 2 s, and margin")
 _ACRO = 10
 """nav_state of acro, in which every attitude is meant (vehicle_status.msg)."""
@@ -40,8 +43,10 @@ class Hit(NamedTuple):
 
     time_s: float
     speed_ms: float
-    blow: float
-    """m/s^2."""
+    blow: float | None
+    """m/s^2; None where the record of the accelerations is too sparse to hold one."""
+    falls_s: float
+    """When it began to fall."""
 
 
 class Lost(NamedTuple):
@@ -55,7 +60,32 @@ class Lost(NamedTuple):
 
 
 def hit(flight: Px4Flight) -> Hit | None:
-    """The first time that it hit the ground at speed: a blow at the end of a fast descent that ended the flight."""
+    """The first time that it hit the ground at speed: a fast descent that ended the flight, with a blow, or near the
+    height at which it was armed."""
+    hits = (one for one in (_struck(flight), _dropped(flight)) if one is not None)
+    return min(hits, key=lambda one: one.time_s, default=None)
+
+
+def _dropped(flight: Px4Flight) -> Hit | None:
+    """The first fall from which it did not move again. A fall is seen in speed and height: estimators leap in one."""
+    for start, end in flight.armed:
+        heights, position = flight.heights((start, end)), flight.table(POSITION, "z", "vz")
+        if heights is None or position is None or not flight.hovers:
+            continue
+        vz = np.interp(heights.t, position.t, np.nan_to_num(position["vz"]))
+        for begin, over in flight.spans(heights.t, vz > _HIT_MS):
+            before = heights.between(begin - _FALLS_S, over)["height"]
+            after = heights.between(over + _FALLS_S, over + _FALLS_S + _LIES_S)
+            if len(after) < 3 or after.t[-1] - after.t[0] < _LIES_S / 2 or over + _LIES_S > end:
+                continue
+            lies = np.ptp(after["height"]) < _LIES_M and bool(np.all(np.abs(after["height"]) < _GROUND_M))
+            if lies and before.max() - before.min() > _HIT_MS * _FALLS_S / 2:
+                return Hit(over, float(vz[(heights.t >= begin) & (heights.t <= over)].max()), None, begin)
+    return None
+
+
+def _struck(flight: Px4Flight) -> Hit | None:
+    """The first blow at the end of a fast descent that ended the flight."""
     table, position = flight.table(_COMBINED, *_FORCES), flight.table(POSITION, "z")
     if table is None or position is None:
         return None
@@ -72,7 +102,7 @@ def hit(flight: Px4Flight) -> Hit | None:
         usual = felt[(table.t >= at - _USUAL_S) & (table.t < at - 0.2)]
         is_blow = not len(usual) or blow > _OVER_USUAL * float(np.max(usual))
         if speed > _HIT_MS and is_blow and _ends_after(flight, at):
-            return Hit(at, speed, blow)
+            return Hit(at, speed, blow, at - _FALLS_S)
     return None
 
 
@@ -97,7 +127,7 @@ def lost_control(flight: Px4Flight) -> Lost | None:
     impact = hit(flight)
     for start, end in flight.spans(lean.t, off):
         falls = impact is not None and start <= impact.time_s <= end + _ENDED_S
-        if end - start < _LASTS_S or not _is_aloft(flight, start) or not (falls or _stays(flight, lean, end)):
+        if not is_aloft(flight, start) or not (falls or (end - start >= _LASTS_S and _stays(flight, lean, end))):
             continue
         now = (lean.t >= start) & (lean.t <= start + _LASTS_S)
         fall = lean.off[:, now].mean(axis=1)
@@ -108,7 +138,7 @@ def lost_control(flight: Px4Flight) -> Lost | None:
     return None
 
 
-def _is_aloft(flight: Px4Flight, at: float) -> bool:
+def is_aloft(flight: Px4Flight, at: float) -> bool:
     """Whether it hovered, armed and above the ground, in a mode in which not every attitude is meant."""
     height = flight.height_m(at)
     mode = [mode for t, mode in flight.modes if t <= at][-1:]

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from care_core.ecosystems.base import Check
-from care_core.ecosystems.px4.checks import arming, changes, crash, estimator, flags, kill_switch, motor, recorded
+from care_core.ecosystems.px4.checks import (
+    arming,
+    barometer,
+    changes,
+    crash,
+    estimator,
+    flags,
+    kill_switch,
+    motor,
+    recorded,
+    vibration,
+)
 from care_core.ecosystems.px4.flight import Px4Flight
 
 CHECKS: tuple[Check[Px4Flight], ...] = (
     flags.CHECK,
     estimator.CHECK,
     motor.CHECK,
+    vibration.CHECK,
+    barometer.CHECK,
     changes.CHECK,
     crash.CHECK,
     recorded.CHECK,

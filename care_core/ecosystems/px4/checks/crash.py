@@ -28,13 +28,14 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
             probability=_LOST,
         )
     if hit is not None:
+        stop = "stayed there" if hit.blow is None else f"felt a blow of {hit.blow:.0f} m/s^2"
         yield Finding(
             kind="crash",
             title=f"it hit the ground at {hit.speed_ms:.1f} m/s",
             onset_s=hit.time_s,
             end_s=hit.time_s,
             severity="critical",
-            evidence=f"it came down at {hit.speed_ms:.1f} m/s into a blow of {hit.blow:.0f} m/s^2",
+            evidence=f"it came down at {hit.speed_ms:.1f} m/s and {stop}",
             source="vehicle_local_position.z, sensor_combined",
             probability=_CRASHED,
         )

@@ -24,6 +24,7 @@ _STOPPED_S = LIMITS.add("shortest stop in the air", 0.3, "s", "a choice: a desce
 _NEAR_S = LIMITS.add("time before control was lost", 2.0, "s", "it falls, then turns over")
 _FALLS_S = LIMITS.add("left out before control was lost", 0.5, "s", "a choice: it is driven to right the vehicle")
 _WEAK = LIMITS.add("probability that a motor driven harder is weak", 0.7, "", "as of ArduPilot: 9 of 12 such flights")
+_AT_LIMIT = LIMITS.add("output of a motor that can give no more", 0.97, "of the range", "a choice")
 _CUT = LIMITS.add("probability that the stop made it fall", 0.9, "", "what has no thrust falls")
 
 
@@ -33,28 +34,37 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     if commands is None:
         return
     if lost is None:
-        yield from _weak(flight, commands, math.inf)
+        dropped = upset.hit(flight)
+        found = None
+        if dropped is not None and upset.is_aloft(flight, dropped.falls_s):
+            found = _gave_way(flight, commands, dropped.falls_s, (0.0, 0.0))
+        yield from [found] if found is not None else _weak(flight, commands, math.inf)
         return
     stopped_s = _all_stopped_s(commands, lost.time_s)
     if stopped_s is not None:
         yield _all_stopped(flight, stopped_s, lost)
         return
+    found = _gave_way(flight, commands, lost.time_s, lost.fall)
+    yield from [found] if found is not None else _weak(flight, commands, lost.time_s - _FALLS_S)
+
+
+def _gave_way(flight: Px4Flight, commands: Commands, upset_s: float, fall: tuple[float, float]) -> Finding | None:
+    """The motor that was driven hardest as it tipped or fell."""
     placed = _placed(flight)
     arms = {motor.number: motor.angle_deg for motor in placed}
-    hardest = driven_hardest(commands, lost.time_s, lost.fall, arms)
-    if hardest is not None:
-        yield Finding(
-            kind="motor",
-            title=hardest.title(placed),
-            onset_s=min(hardest.near_s, lost.time_s),
-            end_s=lost.time_s,
-            severity="critical",
-            evidence=hardest.evidence,
-            source="actuator_motors or actuator_outputs, vehicle_attitude",
-            probability=lost_motor.PROBABILITY,
-        )
-    else:
-        yield from _weak(flight, commands, lost.time_s - _FALLS_S)
+    hardest = driven_hardest(commands, upset_s, fall, arms)
+    if hardest is None:
+        return None
+    return Finding(
+        kind="motor",
+        title=hardest.title(placed),
+        onset_s=min(hardest.near_s, upset_s),
+        end_s=upset_s,
+        severity="critical",
+        evidence=hardest.evidence,
+        source="actuator_motors or actuator_outputs, vehicle_attitude",
+        probability=lost_motor.PROBABILITY,
+    )
 
 
 def _weak(flight: Px4Flight, commands: Commands, until_s: float) -> Iterator[Finding]:
@@ -63,7 +73,8 @@ def _weak(flight: Px4Flight, commands: Commands, until_s: float) -> Iterator[Fin
     if landed is None or not flight.hovers:
         return
     at = np.maximum(np.searchsorted(landed.t, commands.t, side="right") - 1, 0)
-    flown = (landed["landed"][at] == 0) & (commands.t < until_s)
+    down_s = max((end for _, end in flight.aloft), default=0.0)
+    flown = (landed["landed"][at] == 0) & (commands.t < min(until_s, down_s))
     flown &= np.array([any(start < t <= end for start, end in flight.armed) for t in commands.t.tolist()], dtype=bool)
     weak = weakened(commands, flown)
     if weak is None:
@@ -74,7 +85,7 @@ def _weak(flight: Px4Flight, commands: Commands, until_s: float) -> Iterator[Fin
         title=f"motor {weak.number}{place} lost thrust",
         onset_s=weak.since_s,
         end_s=weak.until_s,
-        severity="warning" if math.isinf(until_s) else "critical",
+        severity="critical" if math.isfinite(until_s) or weak.share > _AT_LIMIT else "warning",
         evidence=f"it is asked for {weak.share:.0%} where the others are at {weak.others:.0%}; before, they were even",
         source="actuator_motors or actuator_outputs",
         probability=_WEAK,
