@@ -23,6 +23,10 @@ class State(Record):
     kind: FindingKind | None = None
     severity: Severity = "warning"
     suspect: SuspectKind = "hardware"
+    probability: float = 0.5
+    """That the part really failed, seeing this."""
+    mission_lost: float | None = None
+    """That a mission fails with it; None: as its severity says."""
 
 
 class Episode(NamedTuple):
@@ -49,6 +53,8 @@ class Episode(NamedTuple):
             evidence=f"{self.text}, by the vehicle's own check",
             source=self.source,
             suspect=self.state.suspect,
+            probability=self.state.probability,
+            mission_lost=self.state.mission_lost,
         )
 
 

@@ -10,7 +10,7 @@ from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.px4.upset import LEFT_DEG, LIMITS, READS
 
-_LOST = LIMITS.add("probability of a part, control lost", 0.3, "", "a choice: control is lost for many reasons")
+_LOST = LIMITS.add("probability of a part, control lost", 0.1, "", "training flights: 1 of 15, else gains")
 _CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
 
 

@@ -11,21 +11,29 @@ from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.logs.base import Wanted
 
 _TOPIC = "estimator_status"
-STATES = (
-    State(_TOPIC, "vel_test_ratio", "estimator rejects velocity", "gps"),
-    State(_TOPIC, "pos_test_ratio", "estimator rejects position", "gps"),
-    State(_TOPIC, "hgt_test_ratio", "estimator rejects height", "barometer"),
-    State(_TOPIC, "mag_test_ratio", "estimator rejects compass", "compass"),
-    State(_TOPIC, "hdg_test_ratio", "estimator rejects heading", "compass"),
-)
-"""Newer firmware publishes the ratio of the heading, whatever gives it, in place of the compass's."""
-
-READS: Wanted = {_TOPIC: tuple(state.field for state in STATES)}
 LIMITS = Limits()
 _REJECTED = LIMITS.add(
     "innovation test ratio", 1.0, "", "EstimatorStatus.msg: EKF2 does not use a sensor whose ratio is above 1"
 )
 _SHORTEST_S = LIMITS.add("shortest rejection", 1.0, "s", "a choice: single outliers are what the test is for")
+_PLACE = LIMITS.add("probability of the GPS, position rejected", 0.85, "", "training flights: 5 of 5")
+_PLACE_LOST = LIMITS.add("probability that a mission fails with it", 0.85, "", "training flights: 5 of 5")
+_COMPASS = LIMITS.add("probability of the compass, rejected", 0.8, "", "training flights: 2 of 2; as a disturbed field")
+_COMPASS_LOST = LIMITS.add("probability that a mission fails with it", 0.1, "", "training flights: 0 of 6")
+
+STATES = (
+    State(_TOPIC, "vel_test_ratio", "estimator rejects velocity", "gps"),
+    State(_TOPIC, "pos_test_ratio", "estimator rejects position", "gps",
+          probability=_PLACE, mission_lost=_PLACE_LOST),
+    State(_TOPIC, "hgt_test_ratio", "estimator rejects height", "barometer"),
+    State(_TOPIC, "mag_test_ratio", "estimator rejects compass", "compass",
+          probability=_COMPASS, mission_lost=_COMPASS_LOST),
+    State(_TOPIC, "hdg_test_ratio", "estimator rejects heading", "compass",
+          probability=_COMPASS, mission_lost=_COMPASS_LOST),
+)  # fmt: skip
+"""Newer firmware publishes the ratio of the heading, whatever gives it, in place of the compass's."""
+
+READS: Wanted = {_TOPIC: tuple(state.field for state in STATES)}
 
 
 def episodes(flight: Px4Flight) -> Iterator[Episode]:

@@ -12,6 +12,18 @@ from care_core.logs.base import Wanted, merge_needs
 
 _OLD_FLAGS, _ESTIMATOR = "vehicle_status_flags", "estimator_status_flags"
 
+LIMITS = Limits()  # the vehicle applies its own
+_FLIGHTS = "training flights"
+_LOW = LIMITS.add("probability of a battery that will not last", 0.5, "", f"{_FLIGHTS}: 9 of 19, others flew slowly")
+_LOW_LOST = LIMITS.add("probability that a mission fails with it", 0.9, "", f"{_FLIGHTS}: 17 of 19")
+_NOWHERE = LIMITS.add("probability of the GPS, no global position", 0.9, "", f"{_FLIGHTS}: 8 of 8")
+_NOWHERE_LOST = LIMITS.add("probability that a mission fails without one", 0.9, "", f"{_FLIGHTS}: 8 of 8")
+_TIPPED = LIMITS.add("probability of a part, attitude beyond limits", 0.15, "", f"{_FLIGHTS}: 3 of 20, else gains")
+_DISTURBED = LIMITS.add("probability of the compass, field disturbed", 0.85, "", f"{_FLIGHTS}: 4 of 4")
+_DISTURBED_LOST = LIMITS.add("probability that a mission fails with it", 0.1, "", f"{_FLIGHTS}: 0 of 6")
+_UNAIDED = LIMITS.add("probability of a part, no position aid", 0.8, "", f"{_FLIGHTS}: 8 of 9, all of the GPS")
+_UNAIDED_LOST = LIMITS.add("probability that a mission fails without it", 0.9, "", f"{_FLIGHTS}: 8 of 9")
+
 STATES = (
     State(STATUS, "failsafe", "failsafe"),
     State(STATUS, "rc_signal_lost", "radio lost", "radio"),
@@ -21,25 +33,30 @@ STATES = (
     State(FLAGS, "manual_control_signal_lost", "radio lost", "radio"),
     State(FLAGS, "gcs_connection_lost", "ground station lost", "radio", "info"),
     State(FLAGS, "battery_unhealthy", "battery unhealthy", "battery", "critical"),
-    State(FLAGS, "battery_low_remaining_time", "battery will not last to reach home", "battery"),
+    State(FLAGS, "battery_low_remaining_time", "battery will not last to reach home", "battery",
+          probability=_LOW, mission_lost=_LOW_LOST),
     State(FLAGS, "geofence_breached", "geofence breached"),
     State(FLAGS, "local_position_invalid", "no valid local position", "estimator"),
-    State(FLAGS, "global_position_invalid", "no valid global position", "gps"),
+    State(FLAGS, "global_position_invalid", "no valid global position", "gps",
+          probability=_NOWHERE, mission_lost=_NOWHERE_LOST),
     State(FLAGS, "attitude_invalid", "no valid attitude", "estimator", "critical"),
     State(FLAGS, "angular_velocity_invalid", "no valid rotation rate", "imu", "critical"),
     State(FLAGS, "wind_limit_exceeded", "wind above its limit"),
-    State(FLAGS, "fd_critical_failure", "attitude beyond the failure detector's limits", "attitude", "critical"),
+    State(FLAGS, "fd_critical_failure", "attitude beyond the failure detector's limits", "attitude", "critical",
+          probability=_TIPPED),
     State(FLAGS, "fd_motor_failure", "motor failure", "motor", "critical"),
     State(FLAGS, "fd_esc_arming_failure", "an ESC did not arm", "motor", "critical"),
     State(FLAGS, "fd_imbalanced_prop", "imbalanced propeller", "vibration"),
     State(_OLD_FLAGS, "condition_battery_healthy", "battery unhealthy", "battery", "critical"),
     State(_OLD_FLAGS, "vtol_transition_failure", "transition failed", "attitude"),
-    State(_ESTIMATOR, "cs_mag_field_disturbed", "magnetic field disturbed", "compass"),
+    State(_ESTIMATOR, "cs_mag_field_disturbed", "magnetic field disturbed", "compass",
+          probability=_DISTURBED, mission_lost=_DISTURBED_LOST),
     State(_ESTIMATOR, "cs_mag_fault", "compass given up by the estimator", "compass"),
-    State(_ESTIMATOR, "cs_inertial_dead_reckoning", "estimator without position aid", "estimator"),
+    State(_ESTIMATOR, "cs_inertial_dead_reckoning", "estimator without position aid", "estimator",
+          probability=_UNAIDED, mission_lost=_UNAIDED_LOST),
     State(_ESTIMATOR, "fs_bad_acc_vertical", "vertical accelerations make no sense", "vibration"),
     State(_ESTIMATOR, "fs_bad_acc_clipping", "accelerometers clip", "vibration"),
-)
+)  # fmt: skip
 """msg/VehicleStatus.msg, FailsafeFlags.msg, VehicleStatusFlags.msg (to 1.13) and EstimatorStatusFlags.msg."""
 _OF_PARTS = frozenset((
     "battery_unhealthy", "battery_low_remaining_time", "condition_battery_healthy", "global_position_invalid",
@@ -48,7 +65,6 @@ _OF_PARTS = frozenset((
 _GOOD_WHEN_SET = frozenset(("condition_battery_healthy",))
 
 READS: Wanted = merge_needs({state.topic: (state.field,)} for state in STATES)
-LIMITS = Limits()  # the vehicle applies its own
 
 
 def episodes(flight: Px4Flight) -> Iterator[Episode]:
