@@ -60,6 +60,7 @@ _ARMED_BY = re.compile(r"\[commander\] (?:Armed|Disarmed) (by .+)")
 _PREFLIGHT = re.compile(
     r"Preflight|Arming check|Not ready|arming denied|Mission rejected|Geofence violation for waypoint", re.IGNORECASE
 )
+_DENIED = re.compile(r"Arming denied", re.IGNORECASE)
 _NOT_READY = re.compile(r"^(?:Not ready to fly|Arming check|Preflight(?: Fail)?): ?", re.IGNORECASE)
 _KILLED = re.compile(r"\bKill(?:[- ]?switch)? engaged", re.IGNORECASE)
 """What the commander says of the kill switch, then and now (Commander.cpp)."""
@@ -131,6 +132,14 @@ class Px4Flight(RunModel):
     def complaints(self) -> tuple[tuple[float, str], ...]:
         """What keeps it from arming, by its own words."""
         return tuple((t, without_speaker(text)) for t, _, text in self.messages if is_complaint(text))
+
+    @property
+    def refusals(self) -> tuple[tuple[float, str], ...]:
+        """The different reasons for which it would not arm, as of when each was given last; that it will not, only
+        where it gives none."""
+        last = {text: t for t, text in self.complaints}
+        reasons = {text: t for text, t in last.items() if not _DENIED.match(text)} or last
+        return tuple(sorted((t, text) for text, t in reasons.items()))
 
     @cached_property
     def kills(self) -> tuple[float, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 from care_core.ecosystems.base import Check, Limits
@@ -12,14 +11,13 @@ from care_core.ecosystems.timeline import counted
 from care_core.logs.base import Wanted
 
 READS: Wanted = {STATUS: ("arming_state",), MESSAGES: ("message",)}
-_DENIED = re.compile(r"Arming denied", re.IGNORECASE)
 LIMITS = Limits()  # the vehicle applies its own
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     if not flight.complaints or flight.armed:
         return
-    reasons = _reasons(flight)
+    reasons = list(dict.fromkeys(reason_of(text) for _, text in flight.refusals))
     first, last = flight.complaints[0][0], flight.complaints[-1][0]
     others = "".join(f"{text}; " for text in reasons[-3:-1])
     yield Finding(
@@ -32,12 +30,6 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         source=f"{MESSAGES} of the preflight checks",
         suspect="parameter",
     )
-
-
-def _reasons(flight: Px4Flight) -> list[str]:
-    """What kept it from arming, each once; the bare denial only where nothing else was said."""
-    told = list(dict.fromkeys(reason_of(text) for _, text in flight.complaints))
-    return [one for one in told if not _DENIED.match(one)] or told
 
 
 CHECK = Check("arming", "preflight checks that kept it from arming", READS, LIMITS, find)

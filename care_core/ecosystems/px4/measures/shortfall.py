@@ -25,11 +25,15 @@ _SAID = tuple(
 """Messages of a flight that speak about its failure; the first that matches counts."""
 
 
+_REASONS = 3
+"""As many as a report has room for: the last ones held to the end."""
+
+
 def evidence(mission: Mission) -> tuple[Evidence, ...]:
     """Messages that speak about a failure of this mission, in time order."""
     flight = flight_of(mission)
     if not is_armed(mission):
-        return tuple(Evidence(t, text, "refusal") for t, text in flight.complaints[-3:])
+        return tuple(Evidence(t, text, "refusal") for t, text in flight.refusals[-_REASONS:])
     found = []
     for t, level, text in flight.messages:
         kind = next((kind for pattern, kind in _SAID if pattern.search(text)), None)
@@ -46,7 +50,7 @@ def shortfall(mission: Mission) -> tuple[str, ...]:
 def _clauses(mission: Mission) -> Iterator[str]:
     flight, flown = flight_of(mission), flown_mission(mission)
     if isinstance(flown, Unavailable):
-        said = flight.complaints
+        said = flight.refusals
         yield f"arming was refused: {said[-1][1]}" if said else "the vehicle never armed"
         return
     if not flown.all_reached:
