@@ -170,3 +170,43 @@ def test_legs_of_two_lengths_take_what_each_takes_alone(short: float) -> None:
     together = value("multicopter_cruise_time", path_length=200.0, legs=2.0, leg_variation=(long - short) / 200.0)
     alone = [value("multicopter_cruise_time", path_length=length, legs=1.0) for length in (short, long)]
     assert together == pytest.approx(sum(alone), rel=1e-9)
+
+
+PX4 = {
+    "speed": 5.0, "fastest": 12.0, "acceleration": 3.0, "jerk": 1000.0, "radius": 0.0, "lean_limit": 45.0,
+    "climb_speed": 3.0, "descent_speed": 1.5, "takeoff_speed": 1.5, "return_height": 30.0, "descend_height": 10.0,
+    "landing_delay": 0.0, "landing_speed": 0.7, "detection_time": 1.0, "disarm_time": 2.0,
+}  # fmt: skip
+
+
+def px4(kind: str, **changed: float) -> float:
+    return value(kind, **{**PX4, **changed})
+
+
+def test_px4s_legs_from_rest_to_rest() -> None:
+    assert px4("px4_cruise_time") == pytest.approx(3 * (100 / 5 + 5 / 3), rel=0.03)
+    assert px4("px4_cruise_time", fastest=2.5) > 300 / 2.5
+    assert px4("px4_cruise_speed") == pytest.approx(300 / px4("px4_cruise_time"))
+
+
+def test_px4_is_no_faster_through_a_corner_than_its_radius_lets() -> None:
+    times = [px4("px4_cruise_time", flown_corners=2.0, corner_turn=90.0, radius=r) for r in (0.0, 1.0, 4.0)]
+    assert times == sorted(times, reverse=True)
+    assert times[-1] >= 300 / 5
+
+
+def test_px4s_mission_is_its_phases() -> None:
+    names = ("takeoff", "cruise", "return", "descent", "landing")
+    phases = sum(px4(f"px4_{name}_time") for name in names)
+    assert px4("px4_mission_time", hold_time=8.0) == pytest.approx(phases + 8)
+    assert px4("px4_energy") == pytest.approx(360 * phases / 3600)
+    assert px4("px4_landing_time") == pytest.approx(5 / 0.7 + 3)
+    assert px4("px4_return_time", returns=0.0) == pytest.approx(0.0, abs=1e-5)
+    assert px4("px4_descent_time", landing_delay=9.0) == pytest.approx(px4("px4_descent_time") + 9)
+
+
+@given(st.floats(0.3, 3.0), st.floats(10.0, 80.0))
+def test_px4_comes_down_later_from_higher_up_and_more_slowly(descent: float, height: float) -> None:
+    usual = px4("px4_descent_time", descent_speed=descent, return_height=height)
+    assert px4("px4_descent_time", descent_speed=descent, return_height=height + 5) >= usual
+    assert px4("px4_descent_time", descent_speed=descent / 2, return_height=height) > usual
