@@ -58,10 +58,12 @@ APART = {
     "arduplane": ("path_length", "legs", "hold_time", "loiter_turns", "rises", "sharpest_corner", "level_power"),
     "quadplane": ("path_length", "legs", "hold_time", "loiter_turns", "rises", "sharpest_corner", "returns"),
     "ardusub": ("path_length", "legs", "hold_time", "climb", "descent", "corner_turn"),
+    "px4": ("path_length", "legs", "hold_time", "commanded_speed", "takeoff_height", "return_distance", "hover_power"),
 }  # fmt: skip
 """Contexts by which the distance of a mission from those of training is told, each in standard deviations."""
 FAULTS = {
     "arducopter": "varied", "ardurover": "rover", "arduplane": "plane", "quadplane": "quadplane", "ardusub": "sub",
+    "px4": "px4",
 }  # fmt: skip
 """Folder of each platform's failed runs of settings that training never saw."""
 FAR = (0.5, 1.0)
@@ -242,7 +244,7 @@ def judge_faults(profile: Profile, folder: Path, peer: PlainClassifier) -> Fault
         fixing = [frozenset(options) for options in truth.get("fixing") or () if "hardware" not in options]
         if truth["ok"] or not fixing:
             continue
-        log = open_log(folder / f"{truth['tag']}.BIN")
+        log = open_log(next(folder.glob(f"{truth['tag']}.*")))
         judged = read_and_judge(run_model(log), profile)
         diagnosis = triage(judged, profile, choose_profile(log, [profile])[1], top=10)
         _count(found, judged, diagnosis, profile, truth, fixing, peer)

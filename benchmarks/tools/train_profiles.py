@@ -83,7 +83,7 @@ SOURCES = {
     "px4": Source(
         ("data/px4/table.tar.xz",),
         "Missions of the PX4 v1.15.4 firmware in its simulation in hardware (SIH), recorded by this project under "
-        "random configurations and winds: those of 0 flights of 0 settings (mission, vehicle, site) in which no "
+        "random configurations and winds: those of 463 flights of 44 settings (mission, vehicle, site) in which no "
         "hardware failed; ULog files, read by `care ingest`.",
         hardware="data/px4/table.csv",
     ),
