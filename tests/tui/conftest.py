@@ -14,11 +14,13 @@ from care_core.diagnose.records import Diagnosis, Fix
 from care_core.variables import Change
 from care_tui.app import CareApp
 from care_tui.engine import Engine
+from care_tui.screens.case import CaseScreen
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
 
 LOG = Path("/flights/00000042.BIN")
 MakeApp = Callable[..., CareApp]
+_TRIES = 200
 
 
 @pytest.fixture(autouse=True)
@@ -130,6 +132,18 @@ async def settle(pilot: Pilot[int], *keys: str) -> None:
 async def quiet(pilot: Pilot[int]) -> None:
     """Wait for the workers of every screen, and for what they bring to be shown."""
     await pilot.pause()
-    while len(pilot.app.workers):  # an answer may lead to another question
-        await pilot.app.workers.wait_for_complete()
-        await pilot.pause()
+    for _ in range(_TRIES):
+        while len(pilot.app.workers):  # an answer may lead to another question
+            await pilot.app.workers.wait_for_complete()
+            await pilot.pause()
+        # A reading begins after the first frame, and a page is laid out when it has settled: on a loaded machine late.
+        if not _is_to_begin(pilot.app) and not pilot.app._batch_count:
+            return
+        await pilot.pause(0.01)
+
+
+def _is_to_begin(app: object) -> bool:
+    """Whether a log is to be read and no work on it has begun or ended."""
+    screen = app.screen if isinstance(app, CareApp) else None
+    session = screen.session if isinstance(screen, CaseScreen) else None
+    return session is not None and session.state == "loading" and session.path is not None

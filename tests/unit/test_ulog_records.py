@@ -119,8 +119,8 @@ def test_what_stands_between_records_costs_none(garbage: bytes, at: int) -> None
 @given(st.integers(0, 10_000))
 @settings(max_examples=100, deadline=None)
 def test_a_cut_costs_the_record_that_it_is_in(size: int) -> None:
-    rows = [message(3, START_US + row, bytes(6)) for row in range(50)]
-    begin = head("alpha:uint64_t timestamp;uint8_t[6] x;") + subscription(3, "alpha")
+    rows = [message(700, START_US + row, bytes(6)) for row in range(50)]
+    begin = head("alpha:uint64_t timestamp;uint8_t[6] x;") + subscription(700, "alpha")
     whole = begin + b"".join(rows)
     size = len(begin) + size % (len(whole) - len(begin))
     contents = contents_of(whole[:size])

@@ -17,9 +17,9 @@ _REJECTED = LIMITS.add(
 )
 _SHORTEST_S = LIMITS.add("shortest rejection", 1.0, "s", "a choice: single outliers are what the test is for")
 _PLACE = LIMITS.add("probability of the GPS, position rejected", 0.85, "", "training flights: 5 of 5")
-_PLACE_LOST = LIMITS.add("probability that a mission fails with it", 0.85, "", "training flights: 5 of 5")
+_PLACE_LOST = LIMITS.add("probability that a mission fails so", 0.85, "", "training flights: 5 of 5")
 _COMPASS = LIMITS.add("probability of the compass, rejected", 0.8, "", "training flights: 2 of 2; as a disturbed field")
-_COMPASS_LOST = LIMITS.add("probability that a mission fails with it", 0.1, "", "training flights: 0 of 6")
+_COMPASS_LOST = LIMITS.add("probability that it fails for a compass", 0.1, "", "training flights: 0 of 6")
 
 STATES = (
     State(_TOPIC, "vel_test_ratio", "estimator rejects velocity", "gps"),

@@ -15,12 +15,12 @@ _OLD_FLAGS, _ESTIMATOR = "vehicle_status_flags", "estimator_status_flags"
 LIMITS = Limits()  # the vehicle applies its own
 _FLIGHTS = "training flights"
 _LOW = LIMITS.add("probability of a battery that will not last", 0.5, "", f"{_FLIGHTS}: 9 of 19, others flew slowly")
-_LOW_LOST = LIMITS.add("probability that a mission fails with it", 0.9, "", f"{_FLIGHTS}: 17 of 19")
+_LOW_LOST = LIMITS.add("probability that a mission fails with such a battery", 0.9, "", f"{_FLIGHTS}: 17 of 19")
 _NOWHERE = LIMITS.add("probability of the GPS, no global position", 0.9, "", f"{_FLIGHTS}: 8 of 8")
 _NOWHERE_LOST = LIMITS.add("probability that a mission fails without one", 0.9, "", f"{_FLIGHTS}: 8 of 8")
 _TIPPED = LIMITS.add("probability of a part, attitude beyond limits", 0.15, "", f"{_FLIGHTS}: 3 of 20, else gains")
 _DISTURBED = LIMITS.add("probability of the compass, field disturbed", 0.85, "", f"{_FLIGHTS}: 4 of 4")
-_DISTURBED_LOST = LIMITS.add("probability that a mission fails with it", 0.1, "", f"{_FLIGHTS}: 0 of 6")
+_DISTURBED_LOST = LIMITS.add("probability that a mission fails in such a field", 0.1, "", f"{_FLIGHTS}: 0 of 6")
 _UNAIDED = LIMITS.add("probability of a part, no position aid", 0.8, "", f"{_FLIGHTS}: 8 of 9, all of the GPS")
 _UNAIDED_LOST = LIMITS.add("probability that a mission fails without it", 0.9, "", f"{_FLIGHTS}: 8 of 9")
 
