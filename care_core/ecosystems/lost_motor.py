@@ -41,6 +41,8 @@ _ALONE = LIMITS.add(
 )  # fmt: skip
 _NEXT = LIMITS.add("share of that excess that the next motor may have", 0.6, "", "a choice: one motor, not a pair")
 _BEFORE = LIMITS.add("share of that which it may have had before", 1 / 3, "", "a choice: then it was even")
+_FAR = LIMITS.add("its output above them where nothing was flown before", 0.16, "of the range", "twice the former")
+_EVEN = LIMITS.add("share of that within which the others are alike", 0.25, "", "a choice: a load tips one across")
 _STAYS = LIMITS.add("share of the flight after it", 0.7, "", "a choice: a weak motor stays weak")
 PROBABILITY = LIMITS.add("probability that it gave way", 0.85, "", "as where it fell towards a motor")
 
@@ -145,9 +147,13 @@ def weakened(commands: Commands, flown: NDArray[np.bool_]) -> Weakened | None:
     first = int(np.argmax(mine))
     before = excess[row][at < at[first] - _WINDOW_S]
     after = excess[row][first:]
-    if not mine.any() or mine[first:].mean() < _STAYS or at[-1] - at[first] < _WINDOW_S or 2 * len(before) < width:
+    if not mine.any() or mine[first:].mean() < _STAYS or at[-1] - at[first] < _WINDOW_S / 2:
         return None
-    if float(np.max(before)) > _BEFORE * float(median(after)):
+    if 2 * len(before) >= width:
+        came = float(np.max(before)) < _BEFORE * float(median(after))
+    else:
+        came = _others_are_even(share[:, t >= at[first] - _WINDOW_S / 2], row)
+    if not came:
         return None
     since_s = float(at[first] - _WINDOW_S / 2)
     late = t >= since_s + _WINDOW_S / 2
@@ -155,6 +161,15 @@ def weakened(commands: Commands, flown: NDArray[np.bool_]) -> Weakened | None:
     return Weakened(
         commands.numbers[row], since_s, float(t[-1]), float(asked[row]), float(median(np.delete(asked, row)))
     )
+
+
+def _others_are_even(share: Floats, row: int) -> bool:
+    """Whether one motor is driven far harder and the others alike, as where it gives too little: a load that sits
+    towards it would have the one across driven less."""
+    asked = median(share, axis=1)
+    others = np.delete(asked, row)
+    excess = float(asked[row] - median(others))
+    return excess > _FAR and float(np.ptp(others)) < _EVEN * excess
 
 
 def _mean(values: Floats, width: int) -> Floats:
