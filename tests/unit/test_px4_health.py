@@ -276,3 +276,16 @@ def test_the_bare_denial_is_told_only_where_nothing_else_is() -> None:
     denied = "[commander] Arming denied: Resolve system health failures first"
     assert refused("Arming check: Gyro 1 missing", denied) == ["not ready to fly: Gyro 1 missing"]
     assert refused(denied) == ["not ready to fly: Arming denied: Resolve system health failures first"]
+
+
+def test_a_battery_is_told_by_its_charge_and_by_its_fall_under_load() -> None:
+    def flown(charge: float, loaded_v: float) -> list[tuple[str, str, float]]:
+        return found_in({
+            "vehicle_local_position": states(z=[(0, 0.0), (20, -10.0), (48, 0.0)]),
+            "battery_status": states(voltage_v=[(0, 16.5), (19, loaded_v), (40, loaded_v - 0.1)],
+                                     current_a=[(0, 0.5), (19, 20.0)], remaining=[(0, charge), (30, charge - 0.1)]),
+        }, BAT1_N_CELLS=4.0)  # fmt: skip
+
+    assert flown(1.0, 16.1) == []
+    assert flown(0.3, 16.1) == [("battery", "the battery was not charged", 10.0)]
+    assert flown(1.0, 12.5) == [("battery", "the battery's voltage falls under load", 10.0)]

@@ -134,11 +134,16 @@ class Px4Flight(RunModel):
         return tuple((t, without_speaker(text)) for t, _, text in self.messages if is_complaint(text))
 
     @property
+    def was_denied(self) -> bool:
+        """Whether somebody asked it to arm, and it would not. That it is not ready is said unasked, too."""
+        return any(is_bare_denial(text) for _, text in self.complaints)
+
+    @property
     def refusals(self) -> tuple[tuple[float, str], ...]:
         """The different reasons for which it would not arm, as of when each was given last; that it will not, only
         where it gives none."""
         last = {text: t for t, text in self.complaints}
-        reasons = {text: t for text, t in last.items() if not _DENIED.match(text)} or last
+        reasons = {text: t for text, t in last.items() if not is_bare_denial(text)} or last
         return tuple(sorted((t, text) for text, t in reasons.items()))
 
     @cached_property
@@ -279,6 +284,11 @@ def changes(table: Table, field: str) -> Iterator[tuple[float, float]]:
 def is_complaint(text: str) -> bool:
     """Whether the firmware says that it does not let itself be armed."""
     return _PREFLIGHT.search(text) is not None
+
+
+def is_bare_denial(text: str) -> bool:
+    """Whether the firmware says that it does not arm, and not why."""
+    return _DENIED.match(text) is not None
 
 
 def is_arming(text: str) -> bool:

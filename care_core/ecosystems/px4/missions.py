@@ -52,7 +52,7 @@ class Px4Missions(MissionKind):
 
     def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
         flight = _flight(model)
-        if not flight.armed and flight.complaints:
+        if not flight.armed and flight.was_denied:
             return (Mission(model, tables, 0.0, flight.end_s, True, spec),)
         closed = len(flight.armed) - flight.ends_armed
         return tuple(

@@ -6,6 +6,7 @@ from care_core.ecosystems.base import Check
 from care_core.ecosystems.px4.checks import (
     arming,
     barometer,
+    battery,
     changes,
     crash,
     estimator,
@@ -23,6 +24,7 @@ CHECKS: tuple[Check[Px4Flight], ...] = (
     motor.CHECK,
     vibration.CHECK,
     barometer.CHECK,
+    battery.CHECK,
     changes.CHECK,
     crash.CHECK,
     recorded.CHECK,

@@ -14,7 +14,9 @@ _OLD_FLAGS, _ESTIMATOR = "vehicle_status_flags", "estimator_status_flags"
 
 LIMITS = Limits()  # the vehicle applies its own
 _FLIGHTS = "training flights"
-_LOW = LIMITS.add("probability of a battery that will not last", 0.5, "", f"{_FLIGHTS}: 9 of 19, others flew slowly")
+_LOW = LIMITS.add(
+    "probability of a battery that will not last", 0.1, "", f"{_FLIGHTS}: none of 10 whose battery shows nothing else"
+)
 _LOW_LOST = LIMITS.add("probability that a mission fails with such a battery", 0.9, "", f"{_FLIGHTS}: 17 of 19")
 _NOWHERE = LIMITS.add("probability of the GPS, no global position", 0.9, "", f"{_FLIGHTS}: 8 of 8")
 _NOWHERE_LOST = LIMITS.add("probability that a mission fails without one", 0.9, "", f"{_FLIGHTS}: 8 of 8")
