@@ -289,3 +289,14 @@ def test_a_battery_is_told_by_its_charge_and_by_its_fall_under_load() -> None:
     assert flown(1.0, 16.1) == []
     assert flown(0.3, 16.1) == [("battery", "the battery was not charged", 10.0)]
     assert flown(1.0, 12.5) == [("battery", "the battery's voltage falls under load", 10.0)]
+
+
+def test_a_battery_that_keeps_it_from_arming_is_the_battery() -> None:
+    health = examine(Px4Flight(MadeLog({
+        "vehicle_status": states(arming_state=[(0, 1)], nav_state=[(0, 4)]),
+        "battery_status": states(voltage_v=[(0, 14.5)], current_a=[(0, 0.5)], remaining=[(0, 0.06)]),
+        "logged_messages": words((1.0, "ERROR", "[health_and_arming_checks] Low battery level\t"),
+                                 (9.0, "WARNING", "[commander] Arming denied: Resolve system health failures first")),
+    })))  # fmt: skip
+    found = {one.title for root in health.findings for one in (root, *root.below)}
+    assert {"the battery was not charged", "not ready to fly: Low battery level"} <= found

@@ -183,3 +183,21 @@ def test_a_battery_that_says_the_same_measures_nothing() -> None:
     dead = Table(AT, {name: np.full_like(AT, 16.0) for name in ("voltage_v", "current_a", "remaining", "connected")})
     assert not is_known(value("px4_energy_used", mission(battery_status=dead)))
     assert not is_known(value("px4_start_voltage", mission(battery_status=dead)))
+
+
+def test_what_stays_on_the_ground_with_its_mission_in_force_has_failed() -> None:
+    place, status = flown()["vehicle_local_position"].columns, flown()["vehicle_status"].columns
+    tables = flown(
+        vehicle_local_position=Table(AT, {**place, "z": -1.0 - 0.1 * np.sin(AT)}),
+        vehicle_status=Table(
+            AT, {**status, "nav_state": steps((0, 4), (5, MISSION)), "arming_state": steps((0, 1), (5, 2))}
+        ),
+    )
+    for end_s, wanted in ((150.0, 0.0), (40.0, None)):
+        cut = {name: one.between(0.0, end_s) for name, one in tables.items()}
+        model, read_tables = read(cut, end_s, formats.PX4_ULG, {"stack": "PX4"})
+        kind = MISSION_KINDS["px4_flight"]
+        (found,) = kind.missions(model, read_tables, {})
+        said = value("px4_mission_success", found)
+        assert said == wanted if wanted is not None else not is_known(said)
+        assert any("stayed on the ground" in clause for clause in kind.shortfall(found)) == (wanted is not None)

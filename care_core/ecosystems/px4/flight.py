@@ -58,7 +58,9 @@ _MARKS = re.compile(r"\x1b?\[\d+m")
 _SPEAKER = re.compile(r"^\[\w+\]\s*")
 _ARMED_BY = re.compile(r"\[commander\] (?:Armed|Disarmed) (by .+)")
 _PREFLIGHT = re.compile(
-    r"Preflight|Arming check|Not ready|arming denied|Mission rejected|Geofence violation for waypoint", re.IGNORECASE
+    r"Preflight|Arming check|health_and_arming_checks|Not ready|arming denied|Mission rejected"
+    r"|Geofence violation for waypoint",
+    re.IGNORECASE,
 )
 _DENIED = re.compile(r"Arming denied", re.IGNORECASE)
 _NOT_READY = re.compile(r"^(?:Not ready to fly|Arming check|Preflight(?: Fail)?): ?", re.IGNORECASE)

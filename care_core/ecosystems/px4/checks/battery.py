@@ -27,13 +27,14 @@ _FEWEST = 3
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     table = flight.table(_TOPIC, "voltage_v", "current_a", "remaining")
-    if table is None or not flight.armed or flight.arming[0][1]:  # nothing shows it at rest
+    if table is None or not flight.arming or flight.arming[0][1]:  # nothing shows it at rest
         return
-    armed_s, end_s = flight.armed[0]
+    armed_s, end_s = flight.armed[0] if flight.armed else (flight.end_s, flight.end_s)
     before = table.between(table.t[0], armed_s)
     if len(before) < _FEWEST:
         return
-    yield from _not_charged(before, armed_s)
+    if flight.armed or flight.was_denied:
+        yield from _not_charged(before, float(before.t[0]) if not flight.armed else armed_s)
     soon = table.between(armed_s, min(armed_s + _LOADED_S, end_s))
     if len(soon):
         loaded = soon.where(soon["current_a"] > _LOADED * float(soon["current_a"].max()))
@@ -50,7 +51,7 @@ def _not_charged(before: Table, armed_s: float) -> Iterator[Finding]:
             onset_s=armed_s,
             end_s=armed_s,
             severity="critical",
-            evidence=f"it was armed at {charge:.0%} of its charge and {float(before['voltage_v'][-1]):.1f} V",
+            evidence=f"it was to fly with {charge:.0%} of its charge, at {float(before['voltage_v'][-1]):.1f} V",
             source=f"{_TOPIC}.remaining",
             suspect="operation",
             probability=_EMPTY,

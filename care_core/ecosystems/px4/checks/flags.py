@@ -23,6 +23,9 @@ _NOWHERE_LOST = LIMITS.add("probability that a mission fails without one", 0.9, 
 _TIPPED = LIMITS.add("probability of a part, attitude beyond limits", 0.15, "", f"{_FLIGHTS}: 3 of 20, else gains")
 _DISTURBED = LIMITS.add("probability of the compass, field disturbed", 0.85, "", f"{_FLIGHTS}: 4 of 4")
 _DISTURBED_LOST = LIMITS.add("probability that a mission fails in such a field", 0.1, "", f"{_FLIGHTS}: 0 of 6")
+_BUMPED = LIMITS.add(
+    "probability of a part, vertical accelerations", 0.1, "", f"{_FLIGHTS}: after falls; vibration has its own check"
+)
 _UNAIDED = LIMITS.add("probability of a part, no position aid", 0.8, "", f"{_FLIGHTS}: 8 of 9, all of the GPS")
 _UNAIDED_LOST = LIMITS.add("probability that a mission fails without it", 0.9, "", f"{_FLIGHTS}: 8 of 9")
 
@@ -56,7 +59,8 @@ STATES = (
     State(_ESTIMATOR, "cs_mag_fault", "compass given up by the estimator", "compass"),
     State(_ESTIMATOR, "cs_inertial_dead_reckoning", "estimator without position aid", "estimator",
           probability=_UNAIDED, mission_lost=_UNAIDED_LOST),
-    State(_ESTIMATOR, "fs_bad_acc_vertical", "vertical accelerations make no sense", "vibration"),
+    State(_ESTIMATOR, "fs_bad_acc_vertical", "vertical accelerations make no sense", "vibration",
+          probability=_BUMPED),
     State(_ESTIMATOR, "fs_bad_acc_clipping", "accelerometers clip", "vibration"),
 )  # fmt: skip
 """msg/VehicleStatus.msg, FailsafeFlags.msg, VehicleStatusFlags.msg (to 1.13) and EstimatorStatusFlags.msg."""

@@ -30,22 +30,20 @@ _CUT = LIMITS.add("probability that the stop made it fall", 0.9, "", "what has n
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     """The motor that gave way, or all that stopped, before control was lost in the air."""
-    lost, commands = upset.lost_control(flight), motors.commands(flight)
+    lost, dropped, commands = upset.lost_control(flight), upset.hit(flight), motors.commands(flight)
     if commands is None:
         return
-    if lost is None:
-        dropped = upset.hit(flight)
-        found = None
-        if dropped is not None and upset.is_aloft(flight, dropped.falls_s):
-            found = _gave_way(flight, commands, dropped.falls_s, (0.0, 0.0))
-        yield from [found] if found is not None else _weak(flight, commands, math.inf)
-        return
-    stopped_s = _all_stopped_s(commands, lost.time_s)
-    if stopped_s is not None:
+    stopped_s = None if lost is None else _all_stopped_s(commands, lost.time_s)
+    if lost is not None and stopped_s is not None:
         yield _all_stopped(flight, stopped_s, lost)
         return
-    found = _gave_way(flight, commands, lost.time_s, lost.fall)
-    yield from [found] if found is not None else _weak(flight, commands, lost.time_s - _FALLS_S)
+    upsets = [] if lost is None else [(lost.time_s, lost.fall)]
+    if dropped is not None and upset.is_aloft(flight, dropped.falls_s):
+        upsets.append((dropped.falls_s, (0.0, 0.0)))  # what swings for long falls for another reason, later
+    found = (_gave_way(flight, commands, at_s, fall) for at_s, fall in upsets)
+    first = next((one for one in found if one is not None), None)
+    until_s = math.inf if lost is None else lost.time_s - _FALLS_S
+    yield from [first] if first is not None else _weak(flight, commands, until_s)
 
 
 def _gave_way(flight: Px4Flight, commands: Commands, upset_s: float, fall: tuple[float, float]) -> Finding | None:

@@ -18,6 +18,10 @@ from care_core.logs.base import Wanted, merge_needs
 from care_core.run import Unavailable, Value, is_known
 
 TOLERANCE_M = 5.0
+GROUND_M = 1.0
+"""Height above where it was armed within which it is on the ground."""
+STRANDED_S = 60.0
+"""Longer than any take-off or wait on the ground takes: the mission does not go on."""
 CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 
 _REASONS = {
@@ -71,6 +75,21 @@ def lost_s(mission: Mission) -> float | None:
     return next((t for t in sorted(times) if mission.start_s <= t <= mission.end_s + 1.0), None)
 
 
+def stranded_s(mission: Mission) -> float | None:
+    """Since when it stays on the ground, armed, with its mission in force to the end of the log; None where it does
+    not, or for less than `STRANDED_S`."""
+    flight = flight_of(mission)
+    heights = flight.heights((mission.start_s, mission.end_s))
+    modes = flight.modes_during((mission.start_s, mission.end_s))
+    if mission.ended or heights is None or not modes or way_of("px4", modes[-1]) != "mission":
+        return None
+    up = np.flatnonzero(heights["height"] > GROUND_M)
+    since = mission.start_s if not len(up) else float(heights.t[up[-1]])
+    entered = max((t for t, _ in flight.modes if t <= mission.end_s), default=mission.start_s)
+    since = max(since, entered)
+    return since if mission.end_s - since >= STRANDED_S and heights.t[-1] - since >= STRANDED_S else None
+
+
 def flew_automatically(mission: Mission) -> bool:
     """Whether the mode that flies missions was in force."""
     modes = flight_of(mission).modes_during((mission.start_s, mission.end_s))
@@ -80,12 +99,13 @@ def flew_automatically(mission: Mission) -> bool:
 @extractor("px4_mission_success", needs=_EVENTS, unit="")
 def mission_success(mission: Mission, args: Args) -> Value:
     """1 when every waypoint was reached, the vehicle landed where the mission ends (within `tolerance_m` of it) and
-    disarmed, with no loss of control, no hard contact and no failsafe; else 0. A refused arming is 0."""
+    disarmed, with no loss of control, no hard contact and no failsafe; else 0. A refused arming is 0, and so is a
+    vehicle that stays on the ground for a minute with its mission in force."""
     if not is_armed(mission):
         return 0.0
     if not flew_automatically(mission):
         return Unavailable("no mission was flown")
-    if lost_s(mission) is not None or failsafe_s(mission) is not None:
+    if any(one(mission) is not None for one in (lost_s, failsafe_s, stranded_s)):
         return 0.0
     return _flown_whole(mission) if mission.ended else CUT
 
