@@ -26,7 +26,7 @@ from care_core.ecosystems.px4.flight import (
 )
 from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.px4.measures.flown import NEEDS, is_armed, span_of_phase
-from care_core.ecosystems.px4.measures.outcome import failsafe_s, flew_automatically, lost_s, stranded_s
+from care_core.ecosystems.px4.measures.outcome import failsafe_s, flew_automatically, halted, lost_s
 from care_core.ecosystems.px4.measures.shortfall import evidence, shortfall
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.logs.base import Table, Wanted
@@ -70,7 +70,7 @@ class Px4Missions(MissionKind):
         return shortfall(mission)
 
     def is_decided(self, mission: Mission) -> bool:
-        return mission.ended or any(one(mission) is not None for one in (lost_s, failsafe_s, stranded_s))
+        return mission.ended or any(one(mission) is not None for one in (lost_s, failsafe_s, halted))
 
     def checks(self, mission: Mission) -> tuple[Check, ...]:
         return () if not is_armed(mission) or flew_automatically(mission) else self.outcome(mission)

@@ -10,7 +10,7 @@ from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.px4.upset import LEFT_DEG, LIMITS, READS
 
-_LOST = LIMITS.add("probability of a part, control lost", 0.1, "", "training flights: 1 of 15, else gains")
+_LOST = LIMITS.add("probability of gains, control lost", 0.85, "", "training flights: 14 of 15, else a motor")
 _CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
 
 
@@ -25,6 +25,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
             severity="critical",
             evidence=f"the attitude is up to {lost.most_deg:.0f} deg off its target and does not recover",
             source=f"vehicle_attitude, vehicle_attitude_setpoint; above {LEFT_DEG:g} deg",
+            suspect="parameter",
             probability=_LOST,
         )
     if hit is not None:

@@ -20,7 +20,7 @@ _LOW = LIMITS.add(
 _LOW_LOST = LIMITS.add("probability that a mission fails with such a battery", 0.9, "", f"{_FLIGHTS}: 17 of 19")
 _NOWHERE = LIMITS.add("probability of the GPS, no global position", 0.9, "", f"{_FLIGHTS}: 8 of 8")
 _NOWHERE_LOST = LIMITS.add("probability that a mission fails without one", 0.9, "", f"{_FLIGHTS}: 8 of 8")
-_TIPPED = LIMITS.add("probability of a part, attitude beyond limits", 0.15, "", f"{_FLIGHTS}: 3 of 20, else gains")
+_TIPPED = LIMITS.add("probability of gains, attitude beyond limits", 0.85, "", f"{_FLIGHTS}: 17 of 20, else motors")
 _DISTURBED = LIMITS.add("probability of the compass, field disturbed", 0.85, "", f"{_FLIGHTS}: 4 of 4")
 _DISTURBED_LOST = LIMITS.add("probability that a mission fails in such a field", 0.1, "", f"{_FLIGHTS}: 0 of 6")
 _BUMPED = LIMITS.add(
@@ -48,7 +48,7 @@ STATES = (
     State(FLAGS, "angular_velocity_invalid", "no valid rotation rate", "imu", "critical"),
     State(FLAGS, "wind_limit_exceeded", "wind above its limit"),
     State(FLAGS, "fd_critical_failure", "attitude beyond the failure detector's limits", "attitude", "critical",
-          probability=_TIPPED),
+          "parameter", _TIPPED),
     State(FLAGS, "fd_motor_failure", "motor failure", "motor", "critical"),
     State(FLAGS, "fd_esc_arming_failure", "an ESC did not arm", "motor", "critical"),
     State(FLAGS, "fd_imbalanced_prop", "imbalanced propeller", "vibration"),

@@ -16,12 +16,14 @@ from care_core.ecosystems.px4.measures.route import landing_error
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted, merge_needs
 from care_core.run import Unavailable, Value, is_known
+from care_core.text import log_time
 
 TOLERANCE_M = 5.0
-GROUND_M = 1.0
-"""Height above where it was armed within which it is on the ground."""
+PLACE_M = 5.0
+"""Within it a vehicle stays where it is: wind moves one that hovers."""
 STRANDED_S = 60.0
-"""Longer than any take-off or wait on the ground takes: the mission does not go on."""
+TAKEOFF_S = 120.0
+"""Longer than any take-off takes: the mission does not go on."""
 CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 
 _REASONS = {
@@ -75,19 +77,25 @@ def lost_s(mission: Mission) -> float | None:
     return next((t for t in sorted(times) if mission.start_s <= t <= mission.end_s + 1.0), None)
 
 
-def stranded_s(mission: Mission) -> float | None:
-    """Since when it stays on the ground, armed, with its mission in force to the end of the log; None where it does
-    not, or for less than `STRANDED_S`."""
-    flight = flight_of(mission)
-    heights = flight.heights((mission.start_s, mission.end_s))
-    modes = flight.modes_during((mission.start_s, mission.end_s))
-    if mission.ended or heights is None or not modes or way_of("px4", modes[-1]) != "mission":
+def halted(mission: Mission) -> tuple[float, str] | None:
+    """Since when a mission in force does not go on to the end of the log, in seconds of the log, and how, in words:
+    its take-off is not over, or the vehicle stays in one place beyond the longest wait that was asked for."""
+    flight, flown = flight_of(mission), flown_mission(mission)
+    modes = [(t, mode) for t, mode in flight.modes if t <= mission.end_s]
+    if mission.ended or isinstance(flown, Unavailable) or not modes or way_of("px4", modes[-1][1]) != "mission":
         return None
-    up = np.flatnonzero(heights["height"] > GROUND_M)
-    since = mission.start_s if not len(up) else float(heights.t[up[-1]])
-    entered = max((t for t, _ in flight.modes if t <= mission.end_s), default=mission.start_s)
-    since = max(since, entered)
-    return since if mission.end_s - since >= STRANDED_S and heights.t[-1] - since >= STRANDED_S else None
+    begun_s = max(mission.start_s, modes[-1][0])
+    if not flown.places and mission.end_s - begun_s >= TAKEOFF_S:
+        return begun_s, f"its take-off was not over after {mission.end_s - begun_s:.0f} s"
+    track = flown.track
+    if track is None or not (last := np.flatnonzero(track.t <= mission.end_s)[-1:]).size:
+        return None
+    places = np.column_stack((track.north, track.east, track.height))
+    away = np.flatnonzero(np.linalg.norm(places - places[last[0]], axis=1)[: last[0]] > PLACE_M)
+    since_s = max(begun_s, float(track.t[away[-1]]) if len(away) else 0.0)
+    wait_s = STRANDED_S + max((item.hold_s for item in flown.places.values()), default=0.0)
+    stays = float(track.t[last[0]]) - since_s >= wait_s
+    return (since_s, f"it stayed where it was from {log_time(since_s)} on") if stays else None
 
 
 def flew_automatically(mission: Mission) -> bool:
@@ -100,12 +108,12 @@ def flew_automatically(mission: Mission) -> bool:
 def mission_success(mission: Mission, args: Args) -> Value:
     """1 when every waypoint was reached, the vehicle landed where the mission ends (within `tolerance_m` of it) and
     disarmed, with no loss of control, no hard contact and no failsafe; else 0. A refused arming is 0, and so is a
-    vehicle that stays on the ground for a minute with its mission in force."""
+    mission in force that does not go on."""
     if not is_armed(mission):
         return 0.0
     if not flew_automatically(mission):
         return Unavailable("no mission was flown")
-    if any(one(mission) is not None for one in (lost_s, failsafe_s, stranded_s)):
+    if any(one(mission) is not None for one in (lost_s, failsafe_s, halted)):
         return 0.0
     return _flown_whole(mission) if mission.ended else CUT
 

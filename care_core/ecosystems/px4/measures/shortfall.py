@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from care_core.ecosystems.measures import Mission
 from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.measures.flown import flight_of, flown_mission, is_armed
-from care_core.ecosystems.px4.measures.outcome import TOLERANCE_M, failsafe_s, lost_s, reasons_of_failsafe, stranded_s
+from care_core.ecosystems.px4.measures.outcome import TOLERANCE_M, failsafe_s, halted, lost_s, reasons_of_failsafe
 from care_core.ecosystems.px4.measures.route import landing_error
 from care_core.run import Evidence, Unavailable, is_known
 from care_core.text import log_time
@@ -65,9 +65,9 @@ def _clauses(mission: Mission) -> Iterator[str]:
     if at_s is not None:
         how = "it hit the ground" if hit is not None and hit.time_s == at_s else "control was lost"
         yield f"{how} at {log_time(at_s)}"
-    since_s = stranded_s(mission)
-    if since_s is not None:
-        yield f"it stayed on the ground from {log_time(since_s)} on"
+    halt = halted(mission)
+    if halt is not None:
+        yield halt[1]
     acted_s = failsafe_s(mission)
     if acted_s is not None:
         about = " and ".join(reasons_of_failsafe(mission))
