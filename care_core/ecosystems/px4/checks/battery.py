@@ -53,7 +53,6 @@ def _not_charged(before: Table, armed_s: float) -> Iterator[Finding]:
             severity="critical",
             evidence=f"it was to fly with {charge:.0%} of its charge, at {float(before['voltage_v'][-1]):.1f} V",
             source=f"{_TOPIC}.remaining",
-            suspect="operation",
             probability=_EMPTY,
             mission_lost=_LOSES,
         )
