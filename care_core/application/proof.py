@@ -51,6 +51,7 @@ _ALIKE = {
     "climb": "height",
     "down": "height",
     "altitude": "height",
+    "path": "north",
     "energy": "current",
     "power": "current",
     "heading": "yaw",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from care_core.application.case import Request, open_case
+from care_core.application.proof import proof_of
 from care_core.files import bundled
 from tests.conftest import Care
 
@@ -30,3 +32,10 @@ def test_a_motor_that_gave_way_is_no_parameter(care: Care) -> None:
     assert found["findings"][0]["title"] == "motor 4 (rear right) gave no thrust"
     assert found["hypotheses"][0]["what"] == "hardware"
     assert not (found["fix"] or {}).get("changes")
+
+
+def test_what_leads_off_the_way_is_shown_along_the_ground() -> None:
+    path = bundled("samples", "px4_failed.ulg")
+    case = open_case(Request(path), lambda *_: None)
+    cause = case.diagnosis.faults[0].causes[0]
+    assert proof_of(case, cause).signals[0].field == "x"
