@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 
 _METRES_PER_DEGREE = 111_195.0
 _GLOBAL = (("POS", "Lat", "Lng"), ("GPS", "Lat", "Lng"), ("vehicle_global_position", "lat", "lon"))
+_ITEMS = {
+    "CMD": ("CNum", "Lat", "Lng"),
+    "navigator_mission_item": ("sequence_current", "latitude", "longitude"),
+}
+"""Channels that hold a mission: number, latitude and longitude of its items, 0 where an item has no place."""
+_ORIGIN = ("ref_lon", "ref_lat")
 _LOCAL = (("vehicle_local_position", "y", "x"),)
 _POSES = {"Odometry": "pose.pose.position", "PoseWithCovarianceStamped": "pose.pose.position"}
 _GOALS = {"MoveBaseActionGoal": "goal.target_pose.pose.position", "PoseStamped": "pose.position"}
@@ -50,7 +56,8 @@ def way_of(case: OpenRun) -> Way:
         found = _track(case, x, y, span)
         if found is not None:
             t, east_m, north_m = found
-            return Way(_points(east_m, north_m), tuple(t.tolist()), _driven_to(case, present, span))
+            legs = _flown_from(case, present, x[0]) or _driven_to(case, present, span)
+            return Way(_points(east_m, north_m), tuple(t.tolist()), legs)
     raise CareError("The log does not say where the robot was.", hint="Record its position.")
 
 
@@ -71,27 +78,41 @@ def _on_the_ground(
     t: NDArray[np.float64], lng: NDArray[np.float64], lat: NDArray[np.float64], corners: tuple[Point, ...]
 ) -> Way:
     """Degrees as metres from where the track begins."""
-    home_lng, home_lat = float(lng[0]), float(lat[0])
-    narrow = math.cos(math.radians(home_lat))
-
-    def metres(east: float, north: float) -> Point:
-        return (east - home_lng) * _METRES_PER_DEGREE * narrow, (north - home_lat) * _METRES_PER_DEGREE
-
-    track = tuple(metres(float(east), float(north)) for east, north in zip(lng, lat, strict=True))
-    legs = tuple(metres(*corner) for corner in corners)
+    home = float(lng[0]), float(lat[0])
+    track = tuple(_metres(home, (float(east), float(north))) for east, north in zip(lng, lat, strict=True))
+    legs = tuple(_metres(home, corner) for corner in corners)
     return Way(track, tuple(t.tolist()), ((0.0, 0.0), *legs) if legs else ())
 
 
-def _flown_to(case: OpenRun, present: Mapping[str, str]) -> tuple[Point, ...]:
-    """The corners of an ArduPilot mission in degrees, longitude first, each item once."""
-    if "CMD" not in present:
+def _metres(home: Point, place: Point) -> Point:
+    """Metres east and north of home of a place, both in degrees, longitude first."""
+    narrow = math.cos(math.radians(home[1]))
+    return (place[0] - home[0]) * _METRES_PER_DEGREE * narrow, (place[1] - home[1]) * _METRES_PER_DEGREE
+
+
+def _flown_from(case: OpenRun, present: Mapping[str, str], channel: str) -> tuple[Point, ...]:
+    """The corners of a mission in metres from the origin of a local position of PX4, which names it in degrees."""
+    table = log_of(case).read({channel: _ORIGIN}).get(channel)
+    corners = _flown_to(case, present)
+    if table is None or not corners or not set(_ORIGIN) <= set(table.columns):
         return ()
-    table = log_of(case).read({"CMD": ["CNum", "Lat", "Lng"]}).get("CMD")
-    if table is None or not {"CNum", "Lat", "Lng"} <= set(table.columns):
+    origins = [(lng, lat) for lng, lat in zip(*(table[field].tolist() for field in _ORIGIN), strict=True)
+               if math.isfinite(lng + lat)]  # fmt: skip
+    return ((0.0, 0.0), *(_metres(origins[-1], corner) for corner in corners)) if origins else ()
+
+
+def _flown_to(case: OpenRun, present: Mapping[str, str]) -> tuple[Point, ...]:
+    """The corners of a mission in degrees, longitude first, each item once."""
+    channel = next((name for name in _ITEMS if name in present), None)
+    if channel is None:
+        return ()
+    fields = _ITEMS[channel]
+    table = log_of(case).read({channel: fields}).get(channel)
+    if table is None or not set(fields) <= set(table.columns):
         return ()
     items = {
         int(number): (float(lng), float(lat))
-        for number, lat, lng in zip(table["CNum"], table["Lat"], table["Lng"], strict=True)
+        for number, lat, lng in zip(*(table[field] for field in fields), strict=True)
         if number and lat and lng
     }
     return tuple(items[number] for number in sorted(items))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timezone
 from functools import cached_property
@@ -63,7 +64,8 @@ _TOGETHER_S = 1.0
 """Within it an event and a logged string are the same."""
 _NO_WORD = re.compile(r"\W+|preflight fail|arming check")
 _NEAR = 100
-"""Messages ahead of a place among which the latest tells its time: several tasks write into one log."""
+"""Messages ahead of a place among which the latest tells its time (several tasks write into one log), and strings that
+an event is held against."""
 
 
 class _Messages(NamedTuple):
@@ -230,8 +232,8 @@ class Px4Log:
     def _spoken(self, others: Iterable[Other]) -> Table:
         """What was said in words, and the events that say what no words did."""
         said = list(self._logged_strings(others))
-        words = [(_bare(one.text), one.t) for one in said]
-        said += (one for one in self._events() if not _is_told(one, words))
+        times, words = [one.t for one in said], [_bare(one.text) for one in said]
+        said += (one for one in self._events() if not _is_told(one, times, words))
         said.sort(key=lambda one: one.t)
         t = np.array([one.t for one in said], dtype=np.float64)
         columns = {"level": [one.level for one in said], "message": [one.text for one in said]}
@@ -284,10 +286,11 @@ def _bare(text: str) -> str:
     return _NO_WORD.sub("", text.casefold())
 
 
-def _is_told(event: _Said, words: Iterable[tuple[str, float]]) -> bool:
-    """Whether a logged string says the same at that time."""
+def _is_told(event: _Said, times: Sequence[float], words: Sequence[str]) -> bool:
+    """Whether a logged string says the same at that time, of strings in the order of their times."""
+    first, last = bisect_right(times, event.t - _TOGETHER_S), bisect_left(times, event.t + _TOGETHER_S)
     own = _bare(event.text)
-    return any(abs(t - event.t) < _TOGETHER_S and own in text for text, t in words)
+    return any(own in text for text in words[first : min(last, first + _NEAR)])
 
 
 class _Times:

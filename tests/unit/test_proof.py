@@ -90,6 +90,9 @@ def test_the_way_is_in_metres_with_the_corners_that_were_asked_for() -> None:
     assert len(way.track) == len(way.times_s) > 100
     assert way.legs[0] == (0.0, 0.0)
     assert way.legs[2] == pytest.approx((59.9, 45.0), abs=0.5)
+    px4 = way_of(care_core.triage(bundled("samples", "px4_failed.ulg")))
+    assert len(px4.legs) > 3, "home and the waypoints"
+    assert min(math.dist(px4.legs[1], point) for point in px4.track) < 15
     drive = way_of(care_core.triage(bundled("samples", "move_base_drive.bag")))
     assert [round(east) for east, _ in drive.legs] == [4, 7, 9, 12, 15]
     with pytest.raises(CareError, match="does not say where"):

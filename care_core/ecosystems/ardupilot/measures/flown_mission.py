@@ -34,6 +34,7 @@ from care_core.ecosystems.vehicles.way import (
     RequestedMission,
     Track,
     distance_to_legs,
+    offset_m,
     phases_home,
 )
 from care_core.logs.base import Wanted, merge_needs
@@ -139,7 +140,7 @@ def analyse(mission: Mission) -> FlownMission:
     drive = _drive(mission, complete_s) if kind in _WITHOUT_AIR else None
     if drive is not None and numbers:
         started.setdefault(numbers[0], drive.start_s)  # named once, before the vehicle may move
-    route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
+    route = np.array([offset_m(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
     corners, end = _way(mission.shared(requested_mission))
     places = dict(zip(numbers, route, strict=True)) if len(route) else {}
     passed = _passed(mission, track, places, started, reached, lands=drive is None)
@@ -197,7 +198,7 @@ def waypoint_offsets(waypoints: Sequence[Waypoint], expected: Sequence[Sequence[
     """Distance in metres, height included, of each waypoint from the one it should be."""
     offsets = []
     for waypoint, (lat, lng, alt_m) in zip(waypoints, expected, strict=True):
-        north, east = _offset((lat, lng), waypoint.lat, waypoint.lng)
+        north, east = offset_m((lat, lng), waypoint.lat, waypoint.lng)
         offsets.append(math.hypot(north, east, waypoint.alt_m - alt_m))
     return offsets
 
@@ -219,10 +220,6 @@ def _way(found: RequestedMission | Unavailable) -> tuple[Floats, tuple[float, fl
     return corners, None if found.ending == "open" else end
 
 
-def _offset(home: Sequence[float], lat: float, lng: float) -> tuple[float, float]:
-    return (lat - home[0]) * METRES_PER_DEGREE, (lng - home[1]) * METRES_PER_DEGREE * math.cos(math.radians(home[0]))
-
-
 def _track(mission: Mission, home: Sequence[float] | None) -> Track | None:
     position = mission.table("POS")
     if home is None or position is None or not has(position, "Lat", "Lng", "RelHomeAlt"):
@@ -230,9 +227,7 @@ def _track(mission: Mission, home: Sequence[float] | None) -> Track | None:
     position = position.where(np.isfinite(position["Lat"] + position["Lng"] + position["RelHomeAlt"]))
     if not len(position):
         return None
-    north = (position["Lat"] - home[0]) * METRES_PER_DEGREE
-    east = (position["Lng"] - home[1]) * METRES_PER_DEGREE * math.cos(math.radians(home[0]))
-    return Track(position.t, north, east, position["RelHomeAlt"])
+    return Track(position.t, *offset_m(home, position["Lat"], position["Lng"]), position["RelHomeAlt"])
 
 
 def _milestones(mission: Mission) -> tuple[dict[int, float], dict[int, float]]:

@@ -6,7 +6,6 @@ before the flight, so a vehicle that never armed has it too.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -32,7 +31,7 @@ from care_core.ecosystems.ardupilot.measures.samples import samples, whole
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.coverage import USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
-from care_core.ecosystems.vehicles.way import METRES_PER_DEGREE, NUMBERS, Ending, RequestedMission
+from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
 from care_core.run import Unavailable, Value
@@ -83,7 +82,7 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
             holds[-1] += max(item.first, 0.0)
         elif item.command in (RETURN, LAND):
             if item.command == LAND and (item.lat or item.lng):
-                points.append((*_offset(item, home), points[-1][2]))
+                points.append((*offset_m(home, item.lat, item.lng), points[-1][2]))
                 holds.append(0.0)
                 speeds.append(speed)
             ending = "return" if item.command == RETURN else "land"
@@ -154,18 +153,13 @@ def _place_of(table: Table | None) -> tuple[float, float, float] | None:
     return float(table["Lat"][at]), float(table["Lng"][at]), height
 
 
-def _offset(item: Item, home: Sequence[float]) -> tuple[float, float]:
-    north = (item.lat - home[0]) * METRES_PER_DEGREE
-    return north, (item.lng - home[1]) * METRES_PER_DEGREE * math.cos(math.radians(home[0]))
-
-
 def _height(item: Item, home: Sequence[float]) -> float:
     return item.alt_m - home[2] if item.frame in _ABOVE_SEA and home[2] else item.alt_m
 
 
 def _place(item: Item, home: Sequence[float], before: tuple[float, float, float]) -> tuple[float, float, float]:
     """Where an item leads; coordinates or a height of 0 mean those of the item before."""
-    north, east = _offset(item, home) if item.lat or item.lng else before[:2]
+    north, east = offset_m(home, item.lat, item.lng) if item.lat or item.lng else before[:2]
     return north, east, _height(item, home) if item.alt_m else before[2]
 
 

@@ -87,14 +87,14 @@ def halted(mission: Mission) -> tuple[float, str] | None:
     begun_s = max(mission.start_s, modes[-1][0])
     if not flown.places and mission.end_s - begun_s >= TAKEOFF_S:
         return begun_s, f"its take-off was not over after {mission.end_s - begun_s:.0f} s"
-    track = flown.track
-    if track is None or not (last := np.flatnonzero(track.t <= mission.end_s)[-1:]).size:
+    track = None if flown.track is None else flown.track.between(mission.start_s, mission.end_s)
+    if track is None:
         return None
     places = np.column_stack((track.north, track.east, track.height))
-    away = np.flatnonzero(np.linalg.norm(places - places[last[0]], axis=1)[: last[0]] > PLACE_M)
-    since_s = max(begun_s, float(track.t[away[-1]]) if len(away) else 0.0)
+    away_s = track.t[np.linalg.norm(places - places[-1], axis=1) > PLACE_M]
+    since_s = max([begun_s, *away_s[-1:].tolist()])
     wait_s = STRANDED_S + max((item.hold_s for item in flown.places.values()), default=0.0)
-    stays = float(track.t[last[0]]) - since_s >= wait_s
+    stays = float(track.t[-1]) - since_s >= wait_s
     return (since_s, f"it stayed where it was from {log_time(since_s)} on") if stays else None
 
 

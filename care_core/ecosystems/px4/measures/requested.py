@@ -14,7 +14,7 @@ import numpy as np
 
 from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
 from care_core.ecosystems.px4.flight import RESULT, RESULT_FIELDS
-from care_core.ecosystems.vehicles.way import METRES_PER_DEGREE, NUMBERS, Ending, RequestedMission
+from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record
 from care_core.run import Unavailable, Value
@@ -62,8 +62,7 @@ class Home(Record):
 
     def offset(self, lat: float, lon: float) -> tuple[float, float]:
         """Metres north and east of home."""
-        east = (lon - self.lon) * METRES_PER_DEGREE * math.cos(math.radians(self.lat))
-        return (lat - self.lat) * METRES_PER_DEGREE, east
+        return offset_m((self.lat, self.lon), lat, lon)
 
 
 def home_of(mission: Mission) -> Home | None:
