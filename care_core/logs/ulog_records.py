@@ -285,9 +285,9 @@ class _Walk:
         if follows and (is_sound or (kind == DATA and (follows == 2 or number[0] not in self._ids))):
             self._take(pos, kind, over, number)
             return over
-        if not _IS_KIND[kind] and follows == 2:
-            return self._leave(pos, over)
         resumed = self._resume(pos)
+        if not _IS_KIND[kind] and follows == 2:  # of a newer logger, unless records lie in what would be its body
+            return self._leave(pos, min(over, resumed))
         if is_sound and resumed >= over:  # what is broken lies behind it
             self._take(pos, kind, over, number)
             return over

@@ -136,14 +136,20 @@ async def quiet(pilot: Pilot[int]) -> None:
         while len(pilot.app.workers):  # an answer may lead to another question
             await pilot.app.workers.wait_for_complete()
             await pilot.pause()
-        # A reading begins after the first frame, and a page is laid out when it has settled: on a loaded machine late.
-        if not _is_to_begin(pilot.app) and not pilot.app._batch_count:
+        if not _is_under_way(pilot.app):
             return
         await pilot.pause(0.01)
 
 
-def _is_to_begin(app: object) -> bool:
-    """Whether a log is to be read and no work on it has begun or ended."""
-    screen = app.screen if isinstance(app, CareApp) else None
-    session = screen.session if isinstance(screen, CaseScreen) else None
-    return session is not None and session.state == "loading" and session.path is not None
+def _is_under_way(app: object) -> bool:
+    """Whether a log is to be read and no work on it has begun or ended, or a page is not laid out and drawn yet: the
+    first begins after a frame, the second when the page has settled and was told its size; on a loaded machine late."""
+    if not isinstance(app, CareApp):
+        return False
+    state = app.workspace.session.state
+    if app.workspace.request is not None and app.workspace.folder is None and state in ("empty", "loading"):
+        return True
+    page = app.screen.page if isinstance(app.screen, CaseScreen) else None
+    return bool(app._batch_count) or (
+        page is not None and page.FITS and state in ("error", "data") and not page.reader.plain
+    )

@@ -116,6 +116,15 @@ def test_what_stands_between_records_costs_none(garbage: bytes, at: int) -> None
     assert found.damage or found.misfits or found.others
 
 
+def test_records_of_a_kind_that_is_not_known_are_left_out() -> None:
+    rows = [message(3, START_US + row, bytes(16)) for row in range(40)]
+    begin = head("alpha:uint64_t timestamp;float[4] x;") + subscription(3, "alpha")
+    newer = ulog_record(b"Z", bytes(287))
+    assert len(contents_of(begin + b"".join(rows[:9]) + newer + b"".join(rows[9:])).places) == 40
+    # What looks like such a record, but has ten others in it, is none.
+    assert len(contents_of(begin + newer[:8] + b"".join(rows)).places) == 40
+
+
 @given(st.integers(0, 10_000))
 @settings(max_examples=100, deadline=None)
 def test_a_cut_costs_the_record_that_it_is_in(size: int) -> None:
