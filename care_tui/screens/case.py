@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from asyncio import Lock
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -89,6 +90,7 @@ class CaseScreen(Screen[None]):
         self._visited: list[Place] = []
         self._serial = 0
         """Pages of another log are other pages."""
+        self._making = Lock()
 
     def compose(self) -> ComposeResult:
         too_small = f"Terminal too small: {MIN_WIDTH} x {MIN_HEIGHT} is needed. q quits."
@@ -134,10 +136,8 @@ class CaseScreen(Screen[None]):
         if switcher.current is not None:
             self.page.filter("")
         is_new = not switcher.query(f"#{id}")
-        if is_new:
-            await switcher.mount(make_page(name, self.workspace, id))
+        page = await self._made(name)
         self.here = name
-        page = cast("Page", switcher.get_child_by_id(id))
         # As large as the one before at once: a size that is news would have the screen laid out and painted twice.
         page.set_reactive(Widget.virtual_size, switcher.size)
         if is_new or moment_s is not None or subject is not None:
@@ -158,10 +158,19 @@ class CaseScreen(Screen[None]):
         switcher = self.query_one(ContentSwitcher)
         missing = [name for name in NAMES if not switcher.query(f"#{self._page_id(name)}")]
         if missing and self.session.case is not None:
-            page = make_page(missing[0], self.workspace, self._page_id(missing[0]))
-            page.display = False
-            await switcher.mount(page)
+            await self._made(missing[0])
             self.call_after_refresh(self._prepare)
+
+    async def _made(self, name: str) -> Page:
+        """The page of a name, made where there is none, hidden until it is turned to. One at a time: a key may ask for
+        a page that is just being prepared, which must have its parts before it can show anything."""
+        switcher, id = self.query_one(ContentSwitcher), self._page_id(name)
+        async with self._making:
+            if not switcher.query(f"#{id}"):
+                page = make_page(name, self.workspace, id)
+                page.display = False
+                await switcher.mount(page)
+            return cast("Page", switcher.get_child_by_id(id))
 
     def _mark(self) -> None:
         session = self.session

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import re
+from asyncio import gather
 from pathlib import Path
 
 import pytest
@@ -542,3 +543,16 @@ async def test_without_colours_and_in_ascii_nothing_is_lost(make_app: MakeApp, m
             assert screen.isascii(), [c for c in screen if not c.isascii()]
         await settle(pilot, "2")
         assert "x FAULT" in items(app)
+
+
+async def test_a_page_that_is_just_being_prepared_is_turned_to_once_it_has_its_parts(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        screen = walk(app)
+        await screen.query_one("#report-1").remove()
+        await gather(screen._made("report"), screen.action_go("report"))
+        await settle(pilot)
+        assert screen.here == "report"
+        assert len(screen.query("#report-1")) == 1
+        assert text(app).startswith("report: yaml")
