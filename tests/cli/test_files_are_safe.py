@@ -105,7 +105,9 @@ def test_a_polite_kill_or_a_lost_connection_leaves_no_temporary_files(tmp_path: 
     environment = {"PATH": "/usr/bin:/bin", "TMPDIR": str(temporary), "HOME": str(tmp_path)}
     command = [sys.executable, "-m", "care_tui", "inspect", str(log)]
     folder = Path(__file__).parents[2]
+    before = signal.signal(number, signal.SIG_DFL)  # what nohup starts ignores a lost connection, as do its children
     process = subprocess.Popen(command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    signal.signal(number, before)
     deadline = time.monotonic() + 20
     # A folder alone may not be the program's to remove yet.
     while not list(temporary.glob("*/*")) and process.poll() is None and time.monotonic() < deadline:

@@ -144,7 +144,7 @@ async def quiet(pilot: Pilot[int]) -> None:
 def _is_under_way(app: object) -> bool:
     """Whether a log is to be read and no work on it has begun or ended, or a page is not laid out and drawn yet: the
     first begins after a frame, the second when the page has settled and was told its size; on a loaded machine late."""
-    if not isinstance(app, CareApp):
+    if not isinstance(app, CareApp) or app._exit:
         return False
     state = app.workspace.session.state
     if app.workspace.request is not None and app.workspace.folder is None and state in ("empty", "loading"):
