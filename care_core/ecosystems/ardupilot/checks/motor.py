@@ -30,6 +30,7 @@ READS: Wanted = {
     "RCOU": tuple(f"C{n}" for n in range(1, 15)),
     "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
     "ESC": ("RPM",),
+    "GPS": ("Spd",),
 }
 
 LIMITS = Limits(lost_motor.LIMITS)
@@ -50,6 +51,7 @@ _STAYS = LIMITS.add("share of the rest of the flight", 0.7, "", "a choice: a wea
 _LASTS_S = LIMITS.add("shortest excess", 4.0, "s", "a choice: a turn is over sooner")
 _TRYING_S = LIMITS.add("first seconds of trying to lift", 12.0, "s", "a choice: then integrators wind up")
 _LIFTING = LIMITS.add("output that lifts", 0.2, "of the range", "a choice: armed motors idle below it")
+_HOVERS_MS = LIMITS.add("speed at which a QuadPlane hovers", 6.0, "m/s", "a choice: faster, its wing lifts part of it")
 _UPRIGHT_DEG = LIMITS.add("lean of what still flies", 60.0, "deg", "a choice: beyond it motors are told to right it")
 _CALM_DEG = LIMITS.add("attitude error before control was lost", 12.0, "deg", "a choice: what drifts off lost no motor")
 _TIPS_DEG = LIMITS.add("lean off the demand towards a motor", 10.0, "deg", "a choice: less points nowhere")
@@ -62,6 +64,7 @@ _FALL_S = LIMITS.add("fall to the side that lost it", 1.2, "s", "a choice: then 
 _AT_LIMIT = LIMITS.add("output at its limit", 0.97, "of the range", "a choice: outputs are rounded")
 _LIMITED = LIMITS.add("critical share of the time at its limit", 0.2, "", "a choice: nothing is left to give")
 _FAR = LIMITS.add("critical excess, in limits", 4.0, "", "a choice")
+_FAR_LASTS_S = LIMITS.add("shortest critical excess", 2.0, "s", "a choice: a QuadPlane lands in seconds")
 _CHANGED = LIMITS.add("share of an excess that it had before", 1 / 3, "", "a choice: then it was even")
 _TURNS = LIMITS.add("share of the others' speed at which it stopped", 0.3, "", "a choice: idling is more")
 _TURNING_RPM = LIMITS.add("speed of motors that turn", 1000.0, "1/min", "a choice: idling is more")
@@ -120,9 +123,11 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def _outputs(flight: Flight) -> _Outputs | None:
     table = flight.one("RCOU")
-    if table is None or not flight.is_copter:
+    if table is None or not (flight.is_copter or flight.kind == "quadplane"):
         return None
-    motors = motors_of(flight.settings, flight.motor_outputs) or _nameless(table.columns)
+    motors = motors_of(flight.settings, flight.motor_outputs)
+    if not motors and flight.is_copter:
+        motors = _nameless(table.columns)
     columns = [_column(motor) for motor in motors]
     if len(columns) < 3 or not all(column in table.columns for column in columns):
         return None
@@ -145,9 +150,9 @@ def _nameless(columns: Mapping[str, Floats]) -> tuple[Motor, ...]:
 
 def _range(flight: Flight, seen: float) -> tuple[float, float]:
     """Pulse widths (microseconds) of an idle output and of the most that one may be asked for, `seen` at most."""
-    low = flight.setting("MOT_PWM_MIN") or flight.setting("RC3_MIN", "THR_MIN_PWM") or 1000.0
-    high = flight.setting("MOT_PWM_MAX") or flight.setting("RC3_MAX") or 2000.0
-    most = flight.setting("MOT_SPIN_MAX")
+    low = flight.setting("MOT_PWM_MIN", "Q_M_PWM_MIN") or flight.setting("RC3_MIN", "THR_MIN_PWM") or 1000.0
+    high = flight.setting("MOT_PWM_MAX", "Q_M_PWM_MAX") or flight.setting("RC3_MAX") or 2000.0
+    most = flight.setting("MOT_SPIN_MAX", "Q_M_SPIN_MAX")
     top = low + (high - low) * (most if most is not None and 0.5 < most <= 1.0 else 1.0)
     return low, min(top, max(seen, low + 0.6 * (high - low)))
 
@@ -160,11 +165,20 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
     for rows in pieces(len(t)):
         lifting[rows] &= median(outputs.share(rows), axis=0) > _LIFTING
     lifting &= ~during(flight.held, t)
+    lifting &= _hovers(flight, t)
     if (tilt := flight.tilt) is not None:
         lifting &= np.interp(t, *tilt) < _UPRIGHT_DEG
     if flight.flown:
         return lifting & during(flight.flown, t)
     return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting
+
+
+def _hovers(flight: Flight, t: Floats) -> Mask:
+    """When a vehicle is carried by its motors alone: a copter always."""
+    moved = flight.one("GPS", "Spd")
+    if flight.is_copter:
+        return np.ones(len(t), dtype=bool)
+    return np.interp(t, moved.t, moved["Spd"]) < _HOVERS_MS if moved is not None else np.zeros(len(t), dtype=bool)
 
 
 def _excess(outputs: _Outputs, where: Mask) -> Iterator[NDArray[np.float64]]:
@@ -174,6 +188,15 @@ def _excess(outputs: _Outputs, where: Mask) -> Iterator[NDArray[np.float64]]:
     for rows in pieces(len(where)):
         share = outputs.share(rows)[:, where[rows]]
         yield np.array([share[n] - median(share[everyone != n], axis=0) for n in everyone])
+
+
+def _smooth_excess(outputs: _Outputs, where: Mask, window: int) -> Iterator[NDArray[np.float64]]:
+    """The same as means over a window, which does not lie across a flight on wings or a pause of the record."""
+    rows = np.flatnonzero(where)
+    for unbroken in np.split(rows, np.flatnonzero(np.diff(outputs.t[rows]) > _WINDOW_S) + 1):
+        held = np.zeros(len(where), dtype=bool)
+        held[unbroken] = True
+        yield from means(_excess(outputs, held), window)
 
 
 def _joined(parts: Iterable[NDArray[Any]]) -> NDArray[Any]:
@@ -193,14 +216,15 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         return
     t = outputs.t[lifting]
     window = records(t, _WINDOW_S)
-    is_alone, is_above = [], []
-    for piece in means(_excess(outputs, lifting), window):
+    is_alone, is_above, is_far = [], [], []
+    for piece in _smooth_excess(outputs, lifting, window):
         order = np.sort(piece, axis=0)
         is_alone.append((piece > ALONE) & (piece >= order[-1] - 1e-9) & (order[-2] < _NEXT * piece))
         is_above.append(piece > ALONE / 2)
+        is_far.append(piece > _FAR * ALONE)
     best: tuple[float, int, float, float] | None = None
-    for n, (alone, above) in enumerate(zip(_joined(is_alone), _joined(is_above), strict=True)):
-        spans = lasting(t, alone, _LASTS_S, gap_s=3.0)
+    for n, (alone, above, far) in enumerate(zip(*map(_joined, (is_alone, is_above, is_far)), strict=True)):
+        spans = lasting(t, alone, _LASTS_S, gap_s=3.0) or lasting(t, alone & far, _FAR_LASTS_S)
         if not spans:
             continue
         since = lifting & (outputs.t >= spans[0][0])
@@ -217,7 +241,7 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     size, n, start, end = best
     share = outputs.share(lifting & (outputs.t >= start))
     limit = float((share[n] > _AT_LIMIT).mean())
-    before = _of_one(means(_excess(outputs, lifting), window), n)[t < start - 2.0]
+    before = _of_one(_smooth_excess(outputs, lifting, window), n)[t < start - 2.0]
     changed = len(before) >= 5 and float(median(before)) < size * _CHANGED
     over = size / ALONE
     yield _finding(
@@ -310,9 +334,9 @@ def _driven_hardest(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
 
 
 def _was_calm(flight: Flight, lost: float) -> bool:
-    """Whether the attitude was followed until shortly before: what oscillates or drifts off lost no motor."""
+    """Whether it hovered and followed its attitude until shortly before: what swings or drifts off lost no motor."""
     error = flight.lean_error
-    if error is None:
+    if error is None or not _hovers(flight, np.array([lost]))[0]:
         return False
     before = error[1][(error[0] >= lost - 6.0) & (error[0] <= lost - 0.6)]
     return len(before) < 2 or quantile(before, 0.8) < _CALM_DEG
