@@ -103,7 +103,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
     clipping = f"; {clips:.0f} clips of the accelerometer's range" if clips else ""
     return Finding(
         kind="vibration",
-        title=f"strong vibration ({peak:.0f} m/s^2)",
+        title=f"strong vibration ({peak:.0f} m/s^2)" if spans else "an accelerometer exceeds its range",
         onset_s=start,
         end_s=end,
         severity=severity,

@@ -42,7 +42,9 @@ _ONE_SIDE = LIMITS.add("mean of a surface over its size", 0.6, "", "a choice: wh
 _WRONG_WAY = LIMITS.add(
     "probability of a surface that turns it the wrong way", 0.9, "", "all 6 of 313 simulated flights that are turned so"
 )
-_STUCK = LIMITS.add("probability of one at its stop", 0.4, "", "a choice: a gain or a trim may hold it there, too")
+_STUCK = LIMITS.add(
+    "probability of one at its stop", 0.3, "", "4 of 13 simulated flights: gains, limits and a stall hold it there, too"
+)
 _FULL = 4500.0
 """AETR of a surface out to its stop (SRV_Channel.h)."""
 _FEWEST = 20
