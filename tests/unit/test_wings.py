@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.findings import Finding, every_finding
+from tests.flights import DOWN_S
 from tests.planes import MadePlane
 
 RATES_HZ = (10.0, 2.5)
@@ -136,3 +137,37 @@ def test_a_record_that_lost_its_attitude_for_a_while_is_read() -> None:
         flown.table["ATT"][name][still] = flown.table["ATT"][name][still][0]
     titles = [one.title for one in every_finding(flown.find())]
     assert "the attitude is frozen" in titles
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+@pytest.mark.parametrize(("number", "place"), [(1, "front right"), (2, "rear left"), (3, "front left")])
+def test_a_lift_motor_that_gives_too_little_when_it_lands(rate_hz: float, number: int, place: str) -> None:
+    flown = hovering(rate_hz)
+    flown.table["RCOU"][f"C{4 + number}"][flown.after(DOWN_S - 6.0, DOWN_S)] += 300.0
+    finding = found(flown, "motor")
+    assert finding is not None
+    assert finding.title == f"motor {number} ({place}) lost thrust"
+    assert finding.severity == "critical"
+    assert finding.onset_s == pytest.approx(DOWN_S - 6.0, abs=2.5)
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_what_lift_motors_do_while_it_flies_by_its_wing_tells_nothing(rate_hz: float) -> None:
+    flown = hovering(rate_hz)
+    helping = flown.after(40.0, 60.0)
+    for n in range(5, 9):
+        flown.table["RCOU"][f"C{n}"][helping] = 1400.0
+    flown.table["RCOU"]["C6"][helping] = 1900.0
+    assert found(flown, "motor") is None
+
+
+def hovering(rate_hz: float) -> MadePlane:
+    """A QuadPlane that hovers after it took off and before it lands, on four even motors."""
+    flown = MadePlane(rate_hz)
+    flown.settings |= {"Q_ENABLE": 1, "Q_FRAME_CLASS": 1, "Q_FRAME_TYPE": 1, "Q_M_PWM_MIN": 1000, "Q_M_PWM_MAX": 2000,
+                       **{f"SERVO{n}_FUNCTION": 28 + n for n in range(5, 9)}}  # fmt: skip
+    hovers = flown.after(10.5, 20.0) | flown.after(DOWN_S - 6.0, DOWN_S)
+    flown.table["GPS"]["Spd"][hovers] = 0.3
+    for n in range(5, 9):
+        flown.table["RCOU"][f"C{n}"] = np.where(hovers, 1550 + flown.noise(5.0), 1000.0)
+    return flown
