@@ -62,7 +62,7 @@ SOURCES = {
     "arduplane": Source(
         ("data/plane/table.tar.xz",),
         "Missions of the ArduPlane V4.5.4 firmware in its software-in-the-loop simulator, recorded by this project "
-        "under random configurations and winds: those of 313 flights of 27 settings (mission, plane, site) in which no "
+        "under random configurations and winds: those of 553 flights of 47 settings (mission, plane, site) in which no "
         "hardware failed; DataFlash logs, read by `care ingest`.",
         hardware="data/plane/table.csv",
     ),

@@ -58,7 +58,7 @@ _CALIBRATION = calibrated(
     "all training flights over the limit have a failing compass, and no other",
 )
 _LOST_ON_WINGS = LIMITS.add(
-    "probability that it costs a plane its mission", 0.2, "", "1 of 4 training flights: a plane steers by its course"
+    "probability that it costs a plane its mission", 0.2, "", "1 of 7 training flights: a plane steers by its course"
 )
 _LOST = LIMITS.add(
     "probability that it costs the mission", 0.65, "",
@@ -172,7 +172,7 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             ),
             source="MAG, MAG2; AP_COMPASS_MAX_XY_LENGTH_DIFF 200 mGauss",
             probability=calibrated_probability(ratio, _CALIBRATION),
-            mission_lost=_LOST_ON_WINGS if flight.kind == "plane" else _LOST,
+            mission_lost=_LOST_ON_WINGS if flight.kind in ("plane", "quadplane") else _LOST,
         )
 
 

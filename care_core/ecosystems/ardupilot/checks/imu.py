@@ -118,7 +118,10 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     limit = NOISE_DPS + _DPS_PER_VIBE * vibration + _turning(sensors[0]) + _at_another_moment(flight, sensors[0])
     chance = _of_a_mean(flight, t, list(apart), _OFFSET_OVER_S)
     over = np.maximum(noise / limit, np.where(_shaken(flight, sensors[0]), 0.0, offset / (OFFSET_DPS + chance)))
-    spans = lasting(t, over > 1.0, _LASTS_S, gap_s=3.0)
+    told = np.ones(len(t), dtype=bool)
+    if flight.kind == "quadplane":  # its lift motors shake it where it stands, more than it tells
+        told = during(flight.flown, t)
+    spans = lasting(t, told & (over > 1.0), _LASTS_S, gap_s=3.0)
     if not spans:
         return
     start, end = _beginning(t, over, spans[0]), spans[-1][1]
