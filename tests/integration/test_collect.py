@@ -128,6 +128,13 @@ def test_commands_do_not_outlive_a_program_that_was_killed(tmp_path: Path) -> No
         _wait_for_the_end_of(int(file.read_text()))
 
 
+def _is_zombie(process: int) -> bool:
+    try:
+        return ") Z " in Path(f"/proc/{process}/stat").read_text()
+    except OSError:  # it ended meanwhile, or this is no Linux
+        return False
+
+
 def _wait_for_the_end_of(process: int) -> None:
     deadline = time.monotonic() + 30
     while time.monotonic() < deadline:
@@ -135,7 +142,7 @@ def _wait_for_the_end_of(process: int) -> None:
             os.kill(process, 0)
         except ProcessLookupError:
             return
-        if Path(f"/proc/{process}/stat").exists() and ") Z " in Path(f"/proc/{process}/stat").read_text():
+        if _is_zombie(process):
             return
         time.sleep(0.05)
     pytest.fail(f"process {process} is still there")
