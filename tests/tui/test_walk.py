@@ -550,7 +550,7 @@ async def test_a_page_that_is_just_being_prepared_is_turned_to_once_it_has_its_p
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         screen = walk(app)
-        await screen.query_one("#report-1").remove()
+        await screen.query("#report-1").remove()
         await gather(screen._made("report"), screen.action_go("report"))
         await settle(pilot)
         assert screen.here == "report"
