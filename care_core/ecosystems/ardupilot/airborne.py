@@ -63,7 +63,6 @@ _HIT_LOST_S = 10.0
 _FAST_MS, _STILL = 5.0, 2.0
 """A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
 _SIMULATED_HIT = re.compile(r"SIM Hit ground at (\d+(?:\.\d+)?) m/s")
-_WINGED = frozenset(("plane", "quadplane"))
 _TAXIES_MS = 8.0
 """Faster over ground, a plane flies or is about to; against a gale its height tells."""
 _TUMBLING_DEG, _TUMBLES_S = 45.0, 2.0
@@ -89,7 +88,7 @@ class Airborne(Armed):
     def airborne(self) -> tuple[Span, ...]:
         """Spans in the air: armed, and higher than a metre or lifted by more than half of what hovering takes; of a
         plane, higher than two metres or faster than it taxies."""
-        if self.kind in _WINGED:
+        if self.is_winged:
             return self._on_wings
         if not self.is_copter:
             return self.armed
@@ -175,7 +174,7 @@ class Airborne(Armed):
     def lost_control_s(self) -> float | None:
         """When a copter in the air, or about to lift, stopped following its attitude demand for good: it never came
         back within limits before the end, the ground, or the disarming."""
-        if self.kind in _WINGED:
+        if self.is_winged:
             return self._tumbled_s
         if not self.is_copter:
             return None

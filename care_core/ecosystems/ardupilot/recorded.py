@@ -183,6 +183,11 @@ class Recorded(RunModel):
         """Whether rotors alone lift it; a log that does not say is told by what only copters have."""
         return self.kind in ("copter", "heli") or (self.kind == "unknown" and "MOT_THST_HOVER" in self.settings)
 
+    @property
+    def is_winged(self) -> bool:
+        """Whether it flies by a wing, a QuadPlane with lift motors beside."""
+        return self.kind in ("plane", "quadplane")
+
     # --- what it said ------------------------------------------------------------------------------------------
 
     @cached_property

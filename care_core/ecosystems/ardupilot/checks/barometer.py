@@ -53,7 +53,7 @@ _CALIBRATION = calibrated(
 _ON_WINGS = calibrated(
     LIMITS,
     ((1.0, 0.3), (2.0, 0.97)),
-    "8 of 8 simulated flights of planes above twice a limit have a failing barometer, none of 3 below",
+    "8 of 9 simulated flights of planes above twice a limit have a failing barometer, none of 3 below",
     "a limit, of a plane",
 )
 _LOST = LIMITS.add(
@@ -101,7 +101,6 @@ def find(flight: Flight) -> Iterator[Finding]:
         f"{words.format(peak * limit)} (limit {limit:g} m)"
         for peak, (_, _, words, limit) in zip(peaks, broken, strict=True)
     )
-    is_winged = flight.kind in ("plane", "quadplane")
     yield Finding(
         kind="barometer",
         title="the barometer is noisy or drifts",
@@ -110,7 +109,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         severity=_severity(flight, start, max(peaks)),
         evidence=f"it {said}",
         source="BARO.Alt against its neighbours, BARO of the second, GPS.Alt; Copter's pre-arm check allows 1 m",
-        probability=calibrated_probability(max(peaks), _ON_WINGS if is_winged else _CALIBRATION),
+        probability=calibrated_probability(max(peaks), _ON_WINGS if flight.is_winged else _CALIBRATION),
         mission_lost=_LOST,
     )
 
@@ -181,7 +180,7 @@ def _noise(flight: Flight, t: Floats, height: Floats) -> Floats:
 def _moved_between(flight: Flight, t: Floats) -> Floats:
     """How far a plane climbs or sinks between the records of its barometer and of its estimate, shape of `t`."""
     known = flight.height
-    if flight.kind not in ("plane", "quadplane") or known is None or len(t) < 3:
+    if not flight.is_winged or known is None or len(t) < 3:
         return np.zeros(len(t))
     return _APART_S * np.abs(np.gradient(np.interp(t, *known), t))
 

@@ -172,7 +172,7 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             ),
             source="MAG, MAG2; AP_COMPASS_MAX_XY_LENGTH_DIFF 200 mGauss",
             probability=calibrated_probability(ratio, _CALIBRATION),
-            mission_lost=_LOST_ON_WINGS if flight.kind in ("plane", "quadplane") else _LOST,
+            mission_lost=_LOST_ON_WINGS if flight.is_winged else _LOST,
         )
 
 

@@ -69,7 +69,6 @@ _LOST = LIMITS.add(
 _OF_CHANGE = LIMITS.add("difference of a plane's gyros, as a share of its rates' change", 0.06, "", "a choice")
 _ERRORS = LIMITS.add("standard errors by which a plane's sensors differ by chance", 4.0, "", "a choice")
 _PLANE_SHAKEN_DPS = LIMITS.add("shaking of a plane that hides an offset", 12.0, "deg/s", "a choice")
-_WINGED = ("plane", "quadplane")
 _FAILED = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
 _APART = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
 
@@ -118,10 +117,10 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     limit = NOISE_DPS + _DPS_PER_VIBE * vibration + _turning(sensors[0]) + _at_another_moment(flight, sensors[0])
     chance = _of_a_mean(flight, t, list(apart), _OFFSET_OVER_S)
     over = np.maximum(noise / limit, np.where(_shaken(flight, sensors[0]), 0.0, offset / (OFFSET_DPS + chance)))
-    told = np.ones(len(t), dtype=bool)
-    if flight.kind == "quadplane":  # its lift motors shake it where it stands, more than it tells
-        told = during(flight.flown, t)
-    spans = lasting(t, told & (over > 1.0), _LASTS_S, gap_s=3.0)
+    is_over = over > 1.0
+    if flight.kind == "quadplane":  # where it stands its lift motors shake it, and VIBE tells nothing of that
+        is_over &= during(flight.flown, t)
+    spans = lasting(t, is_over, _LASTS_S, gap_s=3.0)
     if not spans:
         return
     start, end = _beginning(t, over, spans[0]), spans[-1][1]
@@ -152,7 +151,7 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
 def _at_another_moment(flight: Flight, table: Table) -> Floats:
     """What a plane's turning adds, degrees/s: it rolls and pitches all the time, and two gyros are not recorded at the
     same moment."""
-    if flight.kind not in _WINGED:
+    if not flight.is_winged:
         return np.zeros(len(table))
     changes = length(np.diff(table[axis], prepend=table[axis][:1]) for axis in GYROS)
     return _OF_CHANGE * smooth(table.t, np.degrees(changes), 8.0)
@@ -161,7 +160,7 @@ def _at_another_moment(flight: Flight, table: Table) -> Floats:
 def _of_a_mean(flight: Flight, t: Floats, differences: Sequence[Floats], width_s: float) -> Floats:
     """By how much the means of two sensors of a plane differ by chance, its frame shaking between their records: so
     many standard errors."""
-    if flight.kind not in _WINGED:
+    if not flight.is_winged:
         return np.zeros(len(t))
     spread = sum(smooth(t, one**2, width_s) - smooth(t, one, width_s) ** 2 for one in differences)
     return np.asarray(_ERRORS * np.sqrt(np.maximum(spread, 0.0) / records(t, width_s)))
@@ -183,7 +182,7 @@ def _beginning(t: Floats, over: Floats, span: Span) -> float:
 def _shaken(flight: Flight, table: Table) -> Mask:
     """Where the vehicle turns to and fro so fast that two gyros cannot be compared record by record."""
     rates = length(np.abs(table[axis] - smooth(table.t, table[axis], 5.0)) for axis in GYROS)
-    limit = _PLANE_SHAKEN_DPS if flight.kind in _WINGED else _SHAKEN_DPS
+    limit = _PLANE_SHAKEN_DPS if flight.is_winged else _SHAKEN_DPS
     return np.asarray(smooth(table.t, np.degrees(rates), 8.0) > limit)
 
 

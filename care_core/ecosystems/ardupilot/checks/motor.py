@@ -175,9 +175,9 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
 
 def _hovers(flight: Flight, t: Floats) -> Mask:
     """When a vehicle is carried by its motors alone: a copter always."""
-    moved = flight.one("GPS", "Spd")
     if flight.is_copter:
         return np.ones(len(t), dtype=bool)
+    moved = flight.one("GPS", "Spd")
     return np.interp(t, moved.t, moved["Spd"]) < _HOVERS_MS if moved is not None else np.zeros(len(t), dtype=bool)
 
 

@@ -39,7 +39,7 @@ _HIGH_M = 15.0
 
 def find(flight: Flight) -> Iterator[Finding]:
     """The sensor first: a plane that believes a false airspeed flies too slow by it."""
-    if flight.kind not in ("plane", "quadplane"):
+    if not flight.is_winged:
         return
     moved = flight.one("GPS", "Spd")
     sensor = flight.one("ARSP", "Airspeed")

@@ -43,7 +43,7 @@ _WRONG_WAY = LIMITS.add(
     "probability of a surface that turns it the wrong way", 0.9, "", "all 6 of 313 simulated flights that are turned so"
 )
 _STUCK = LIMITS.add(
-    "probability of one at its stop", 0.3, "", "4 of 13 simulated flights: gains, limits and a stall hold it there, too"
+    "probability of one at its stop", 0.3, "", "4 of 14 simulated flights: gains, limits and a stall hold it there, too"
 )
 _FULL = 4500.0
 """AETR of a surface out to its stop (SRV_Channel.h)."""
@@ -83,7 +83,7 @@ class _Flown(NamedTuple):
 
 def find(flight: Flight) -> Iterator[Finding]:
     """One finding a surface: one that turns the plane the wrong way goes to its stop as well."""
-    if flight.kind not in ("plane", "quadplane"):
+    if not flight.is_winged:
         return
     for surface in _SURFACES:
         flown = _flown(flight, surface)
