@@ -4,6 +4,7 @@ several readers beside each other."""
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
@@ -22,6 +23,8 @@ OBSTACLES = ("ObstacleLayer", "VoxelLayer")
 INFLATIONS = ("InflationLayer", "LegacyInflationLayer", "AsymmetricInflationLayer")
 SAMPLED = ("DWAPlannerROS", "TrajectoryPlannerROS", "DWBLocalPlanner")
 """Planners that try speeds out, over a time ahead."""
+_CRITICS = ("CostCritic", "ObstaclesCritic")
+"""MPPI's, that may hold a footprint against the costmap."""
 TOP_SPEEDS = ("max_vel_x", "vx_max", "desired_linear_vel", "max_linear_vel", "v_linear_max")
 _RANGES = {"obstacle_max_range": 2.5, "raytrace_max_range": 3.0}
 """What a source of Nav2's obstacle layers has where nothing is written, m (obstacle_layer.cpp)."""
@@ -154,6 +157,10 @@ class Reader(Struct, eq=False):
     def is_on(self, name: str) -> bool:
         return name in self.values and self.values[name].value == "true"
 
+    def has_footprint(self) -> bool:
+        """Whether a costmap's robot is drawn, and is not a circle."""
+        return "footprint" in self.values and str(self.values["footprint"].value).strip() not in ("", "[]")
+
     def own(self, name: str) -> list[Entry]:
         """A value of its own or of its parts, such as the sources of a layer."""
         return [entry for key, entry in self.values.items() if key.rpartition(".")[2] == name]
@@ -253,6 +260,31 @@ def _simulated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield _problem("contradiction", file, entry, text, hint, "the trajectory generators", [rate])
 
 
+def _predicted(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Steps of MPPI shorter than a control step, and a footprint that it is told to consider and nobody draws."""
+    rate = _rate(held)
+    for reader in held.of("MPPIController"):
+        entry = reader.values.get("model_dt")
+        if entry is not None and entry.number and rate is not None and 0 < entry.number * (rate.number or 0) < 0.9999:
+            text = (
+                f"model_dt ({entry.number:g} s) is shorter than a step of controller_frequency ({rate.number:g} Hz): "
+                "MPPI does not start."
+            )
+            hint = f"Make it {1 / (rate.number or 1):.3g}."
+            yield _problem("cannot-work", file, entry, text, hint, "optimizer.cpp, setOffset", [rate])
+    local = [one for one in held.of(COSTMAP) if any("local_costmap" in key for key in one.scope)]
+    if not local or any(one.has_footprint() for one in local):
+        return
+    for reader in held.of("MPPIController", *_CRITICS):
+        for switch in reader.own("consider_footprint"):
+            if switch.value == "true":
+                text = (
+                    f"{'.'.join(switch.keys[-2:])} is on, and the local costmap has no footprint: MPPI does not start."
+                )
+                hint = "Give the costmap a footprint, or switch it off."
+                yield _problem("cannot-work", file, switch, text, hint, "cost_critic.cpp, obstacles_critic.cpp")
+
+
 def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     """Tolerances that the smallest step of a turn leaps over."""
     rate = _rate(held)
@@ -345,6 +377,11 @@ def _reaches(held: Readers, costmap: Reader) -> Iterator[tuple[float, str, list[
         top, time = reader.first(("max_vel_trans", "max_speed_xy", "max_vel_x")), reader.values.get("sim_time")
         if top is not None and time is not None and top.number and time.number:
             yield top.number * time.number, "where a trajectory of sim_time ends", [top, time]
+    for reader in held.of("MPPIController"):
+        parts = [reader.values.get(name) for name in ("vx_max", "time_steps", "model_dt")]
+        known = [entry for entry in parts if entry is not None and entry.number]
+        if len(known) == len(parts):
+            yield math.prod(entry.number or 0.0 for entry in known), "where a trajectory of time_steps ends", known
     for layer in held.within(costmap.scope):
         entry = layer.values.get("inflation_radius") if layer.is_a(*INFLATIONS) else None
         if entry is not None:
@@ -380,9 +417,7 @@ def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     sized = []
     for reader in held.of(COSTMAP):
         radius = inscribed_radius(reader.values.get("footprint"), reader.values.get("robot_radius"))
-        footprint = reader.values.get("footprint")
-        is_drawn = footprint is not None and str(footprint.value).strip() not in ("", "[]")
-        entry = footprint if is_drawn else reader.values.get("robot_radius")
+        entry = reader.values.get("footprint" if reader.has_footprint() else "robot_radius")
         if radius and entry is not None:
             sized.append((radius, entry))
         padding = reader.values.get("footprint_padding")
@@ -558,6 +593,6 @@ def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
 
 
 RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
-    _simulated, _settles, _starts, _progress, _window, _cells, _sizes, _marks, _goal_checks, _unknown_space, _drawn,
-    _smoothed, _vectors, _clocks,
+    _simulated, _predicted, _settles, _starts, _progress, _window, _cells, _sizes, _marks, _goal_checks, _unknown_space,
+    _drawn, _smoothed, _vectors, _clocks,
 )  # fmt: skip

@@ -317,3 +317,38 @@ def test_every_plugin_of_the_table_is_of_a_release_and_spelled_one_way_in_it() -
         assert plugins.releases_of(name)
         others = [held for one, held in plugins.spellings(name).items() if one != name]
         assert not any(held & plugins.releases_of(name) for held in others), name
+
+
+def local(*lines: str) -> str:
+    inner = [f"    {line}" for line in ("  ros__parameters:", *(f"    {line}" for line in lines))]
+    return "\n".join(["local_costmap:", "  local_costmap:", *(line[2:] for line in inner), ""])
+
+
+@pytest.mark.parametrize(
+    ("rate", "step", "found"), [(20.0, 0.05, []), (30.0, 0.033333, []), (30.0, 0.05, []), (10.0, 0.05, ["model_dt"])]
+)
+def test_a_step_of_mppi_is_no_shorter_than_one_of_control(
+    tmp_path: Path, rate: float, step: float, found: list[str]
+) -> None:
+    lines = [f"controller_frequency: {rate}", "controller_plugins: [FollowPath]", "FollowPath:", f"  plugin: {MPPI}"]
+    problems = findings(tmp_path, node("controller_server", *lines, f"  model_dt: {step}"))
+    assert [one.parameter.rpartition("/")[2] for one in problems] == found
+    assert all(one.rule == "cannot-work" for one in problems)
+
+
+@pytest.mark.parametrize(("size", "found"), [(3, []), (2, ["width"])])
+def test_what_mppi_looks_ahead_lies_on_the_local_costmap(tmp_path: Path, size: int, found: list[str]) -> None:
+    ahead = controller(MPPI, "vx_max: 0.5", "time_steps: 56", "model_dt: 0.05")
+    problems = findings(tmp_path, ahead + local(f"width: {size}", f"height: {size}"))
+    assert [one.parameter.rpartition("/")[2] for one in problems] == found
+    assert all("time_steps" in one.text for one in problems)
+
+
+@pytest.mark.parametrize(
+    ("shape", "found"),
+    [("robot_radius: 0.3", ["consider_footprint"]), ('footprint: "[[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2]]"', [])],
+)
+def test_mppi_considers_a_footprint_where_there_is_one(tmp_path: Path, shape: str, found: list[str]) -> None:
+    critics = controller(MPPI, "critics: [CostCritic]", "CostCritic:", "  consider_footprint: true")
+    problems = findings(tmp_path, critics + local(shape))
+    assert [one.parameter.rpartition("/")[2] for one in problems if one.rule == "cannot-work"] == found
