@@ -58,6 +58,10 @@ _ALIKE = {
     "acceleration": "speed",
     "stall": "speed",
     "standstill": "speed",
+    "success": "goal",
+    "progress": "goal",
+    "stuck": "goal",
+    "goals": "goal",
 }
 """Words of findings and metrics, and the word that the label of the signal has for it."""
 
@@ -112,9 +116,9 @@ def _score(subject: Subject, signal: Signal, field: Field) -> float:
     # What stands right behind the parameter tells most of it; the objective itself has many signals.
     weights = {name: 1.0 / max(place, 1) for place, name in enumerate(nodes)}
     used = [weights[name] for name in signal.used_by if name in weights]
-    if not used:
-        return 0.0
     words = _with_alike(word for name in nodes[:2] for word in name.split("_"))
+    if not used:
+        return 0.5 * _overlap(field, words & {"goal"})
     share = len(used) / len(signal.used_by)
     return max(used) + share + 2.0 * _overlap(field, words) - (0.9 if field.is_position else 0.0)
 
@@ -130,8 +134,8 @@ def finding_score(finding: Finding, signal: Signal, field: Field) -> float:
     if signal.channel.casefold() in named:
         return 5.0 - 0.2 * named.index(signal.channel.casefold()) + told - 1.5 * field.is_position
     seen_in = _overlap(field, set(_SHOWN_BY.get(finding.kind, "").split()))
-    # Where turning is the matter, the speed ahead shows nothing of it.
-    seen_in += 2 * _overlap(field, title & {"turn"})
+    # Where turning is the matter, the speed ahead shows nothing of it; where the goal is, the way left to it does.
+    seen_in += 2 * _overlap(field, title & {"turn", "goal"})
     return 0.5 * seen_in if seen_in and not field.is_position else 0.0
 
 

@@ -83,6 +83,7 @@ KNOWN_TYPES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "pose.pose.position.x": (),
         "pose.pose.position.y": (),
     },
+    "NavigateToPose_FeedbackMessage": {"feedback.distance_remaining": ()},
     "Twist": {"linear.x": (), "angular.z": ()},
     "BatteryState": {"voltage": (), "percentage": ()},
     "Imu": {"linear_acceleration.z": (), "angular_velocity.z": ()},

@@ -109,3 +109,11 @@ def test_a_cause_set_aside_has_the_others_weighed_anew() -> None:
     assert sum(one.probability for one in left) == pytest.approx(1.0)
     assert weighed_without(weighed, ()) == weighed
     assert weighed_without(sample.faulty(), {"A"}) == sample.faulty()
+
+
+def test_whether_a_goal_was_reached_is_shown_by_the_way_left_to_it() -> None:
+    case = care_core.triage(bundled("samples", "nav2_failed.mcap"))
+    success = next(one for one in case.diagnosis.objectives if one.variable.name == "mission_success")
+    halted = next(one for one in every_finding(case.diagnosis.health.findings) if "no progress" in one.title)
+    for subject in (success, halted):
+        assert proof_of(case, subject).signals[0].field == "feedback.distance_remaining"

@@ -37,6 +37,7 @@ RECOVERY = "move_base_msgs/RecoveryStatus"
 TRANSITION = "lifecycle_msgs/TransitionEvent"
 TF = ("tf2_msgs/TFMessage", "tf/tfMessage")
 LOCALISED = "geometry_msgs/PoseWithCovarianceStamped"
+NAVIGATION = "nav2_msgs/NavigateToPose_FeedbackMessage"
 ACTION_GOAL, ACTION_RESULT = "ActionGoal", "ActionResult"
 """How the types of a ROS 1 action's goals and results end."""
 
@@ -158,6 +159,7 @@ MESSAGES: Mapping[str, RosMessage] = {
         "goal_id.id", f"{_TARGET}.header.frame_id", *(f"{_TARGET}.pose.position.{axis}" for axis in "xy"),
         *(f"{_TARGET}.pose.{part}" for part in _PARTS),
     ),
+    NAVIGATION: RosMessage({"feedback.distance_remaining": _number("m", "distance to the goal", _FAR_M)}),
     ACTION_RESULT: _reads("status.goal_id.id", "status.status", "status.text"),
     LOCALISED: RosMessage(_POSE, reads=tuple(_POSE), at_most=20_000, label="poses"),
     **dict.fromkeys(("geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped"), _reads(label="poses")),
