@@ -14,7 +14,7 @@ from nav2_robot.robot import Robot
 from nav2_robot.standin import StandIn
 from nav2_robot.world import Conditions, Passage, World
 
-START = Path(__file__).parents[1] / "samples" / "nav2_robot" / "start" / "nav2.yaml"
+START = Path(__file__).parents[1] / "samples" / "nav2_robot" / "start" / "dwb.yaml"
 ROOM = World(
     walls=((-1.2, -2.2, 6.2, -2.0), (-1.2, 2.0, 6.2, 2.2), (-1.2, -2.0, -1.0, 2.0), (6.0, -2.0, 6.2, 2.0)),
     clutter=(),

@@ -58,7 +58,7 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
     """The next step in a sentence, empty where there is nothing to be done."""
     run, findings = diagnosis.run, diagnosis.health.findings
     upset = was_upset(run, findings)
-    if diagnosis.fix is not None:
+    if diagnosis.fix is not None and not diagnosis.abstained:
         again = f"try it {trial(run)} first" if upset else "run again"
         return f"make the change, {again}, and check what it brought with 'care verify REPORT LOG'"
     if has_failed and (undone := _undone(diagnosis)):

@@ -206,6 +206,13 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
     )
 
 
+def why_of(shown_by: str, abstained: str | None, otherwise: str) -> str:
+    """What stands beside a change: that somebody chose it where nothing is advised, what shows it, or why this one."""
+    if abstained:
+        return f"chosen by hand; no change is advised: {abstained}"
+    return f"{shown_by} with it" if shown_by else otherwise
+
+
 def _advice(diagnosis: Diagnosis) -> Advice:
     fix = diagnosis.fix
     if fix is None:
@@ -218,7 +225,7 @@ def _advice(diagnosis: Diagnosis) -> Advice:
         odds_as_driven=diagnosis.odds_as_driven,
         is_guess=fix.is_guess,
         confidence=next((cause.confidence for cause in causes if cause.option.name in changed), None),
-        why=clean(f"{fix.shown_by} with it" if fix.shown_by else diagnosis.why_this),
+        why=clean(why_of(fix.shown_by, diagnosis.abstained, diagnosis.why_this)),
     )
 
 

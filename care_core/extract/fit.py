@@ -18,6 +18,8 @@ MOST = 0.7
 some speak only when something happens."""
 LEAST = 0.3
 """Share of the sources below which hardly anything of a run can be seen."""
+_SHIM, _BEHIND = "RotationShimController", ".primary_controller"
+"""A controller that turns on the spot first and then hands over to another, which it names there."""
 _VEHICLES = {"px4": "a PX4 vehicle", "sub": "a submarine", "heli": "a helicopter", "tracker": "an antenna tracker"}
 
 
@@ -56,9 +58,11 @@ def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle) -> Iterator[str]:
 
 def _other_plugin(log: Log, schema: Schema) -> str:
     """Which part of the stack is another than the profile was learned with; '' where the log names none."""
+    settings = log.settings()
     for name, text in schema.plugins.items():
-        for setting in log.settings().get(name, ()):
-            if text.casefold() not in str(setting.value).casefold():
+        for setting in settings.get(name, ()):
+            behind = settings.get(name.replace(".plugin", _BEHIND), ()) if _SHIM in str(setting.value) else ()
+            if not any(text.casefold() in str(one.value).casefold() for one in (setting, *behind)):
                 return f"{name} is {setting.value}, the profile was learned with {text}"
     return ""
 

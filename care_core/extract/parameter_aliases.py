@@ -1,14 +1,18 @@
-"""A profile by the parameter names of the firmware that flew: its options under the names and units of the log."""
+"""A profile by the parameter names of the release that ran: its options under the names and units of the log."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from care_core.ecosystems.vehicles import Kind, alias_in, vehicle_of
+from care_core.ecosystems.ros.plugin_names import named_here
+from care_core.ecosystems.vehicles import alias_in, vehicle_of
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.records import replace
+from care_core.run import Setting
 from care_core.variables import Role, Variable
+
+Settings = Mapping[str, Sequence[Setting]]
 
 
 def with_logged_names(schema: Schema, log: Log) -> Schema:
@@ -19,9 +23,11 @@ def with_logged_names(schema: Schema, log: Log) -> Schema:
     if log.format.name not in schema.logs:
         return schema
     logged = log.settings()
-    kind = vehicle_of(log.facts, logged).kind
+    kind = schema.match.get("stack") or vehicle_of(log.facts, logged).kind
     if kind in ("unknown", "px4") or all(name in logged for option in schema.options for name in option.parameters):
         return schema
+    if kind == "nav2":
+        schema = _with_own_plugins(schema, logged)
     variables = {
         name: _with_logged_names(variable, logged, kind) if variable.role is Role.OPTION else variable
         for name, variable in schema.variables.items()
@@ -29,7 +35,17 @@ def with_logged_names(schema: Schema, log: Log) -> Schema:
     return replace(schema, variables=variables)
 
 
-def _with_logged_names(option: Variable, logged: Mapping[str, object], kind: Kind) -> Variable:
+def _with_own_plugins(schema: Schema, logged: Settings) -> Schema:
+    """The schema with plugins under the names that the robot gave them."""
+    variables = {
+        name: replace(one, parameters=tuple(named_here(key, logged) for key in one.parameters))
+        for name, one in schema.variables.items()
+    }
+    plugins = {named_here(name, logged): text for name, text in schema.plugins.items()}
+    return replace(schema, variables=variables, plugins=plugins)
+
+
+def _with_logged_names(option: Variable, logged: Settings, kind: str) -> Variable:
     aliases = [alias_in(name, logged, kind) for name in option.parameters]
     if not aliases or any(alias is None for alias in aliases):
         return option

@@ -3,7 +3,8 @@
 Copter and the VTOL half of Plane 4.7: what the firmware does on its first start after the update, as listed in
 ArduPilot's `Tools/scripts/convert_params_4_7.py`; receivers in 4.6: `Tools/autotest/test_param_upgrade.py`. Before:
 `Copter::convert_pid_parameters` and the conversion tables of ArduCopter/Parameters.cpp. Names whose conversion depends
-on other parameters (rate gains of 3.3, ARMING_CHECK) are left out.
+on other parameters (rate gains of 3.3, ARMING_CHECK) are left out. Nav2: its parameter files (nav2_bringup) of 1.3
+and 1.5.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from care_core.records import Record
 
 Version = tuple[int, ...]
 _FIRST: Version = (0,)
+_15 = (1, 5)
 _47, _471 = (4, 7), (4, 7, 1)
 _36, _34, _33, _35, _42, _45, _46 = (3, 6), (3, 4), (3, 3), (3, 5), (4, 2), (4, 5), (4, 6)
 
@@ -168,15 +170,21 @@ def _of_all() -> Iterator[Chain]:
             yield _chain(f"GPS_MB{receiver}_OFS_{axis}", (_46, f"GPS{receiver}_MB_OFS_{axis}", 1))
 
 
+def _of_nav2() -> Iterator[Chain]:
+    """MPPI's pruning went to the controller server in 1.5."""
+    server = "/controller_server"
+    yield _chain(f"{server}.FollowPath.prune_distance", (_15, f"{server}.PathHandler.prune_distance", 1))
+
+
 _FAMILIES: Mapping[str, tuple[str, ...]] = {
     "copter": ("copter", "all"), "heli": ("copter", "all"), "plane": ("plane", "all"),
-    "quadplane": ("plane", "quadplane", "all"),
+    "quadplane": ("plane", "quadplane", "all"), "nav2": ("nav2",),
 }  # fmt: skip
 
 
 @cache
 def _chains(kind: str) -> Mapping[str, Chain]:
-    made = {"copter": _of_copter, "plane": _of_plane, "quadplane": _of_quadplane, "all": _of_all}
+    made = {"copter": _of_copter, "plane": _of_plane, "quadplane": _of_quadplane, "all": _of_all, "nav2": _of_nav2}
     found = [chain for family in _FAMILIES.get(kind, ("all",)) for chain in made[family]()]
     return {alias.name: chain for chain in found for alias in chain}
 

@@ -28,7 +28,7 @@ from care_core.diagnose.records import (
     Status,
     outcome,
 )
-from care_core.diagnose.verdict import Advice, Verdict, alone, chance, compose, promise, reasons_of, verdict_of
+from care_core.diagnose.verdict import Advice, Verdict, alone, chance, compose, promise, reasons_of, verdict_of, why_of
 from care_core.numbers import six_digits
 from care_core.records import Meta, field
 from care_core.report.entries import (
@@ -388,7 +388,7 @@ def _advice(document: TriageDocument) -> Advice:
         odds_as_driven=document.odds_as_driven,
         is_guess=fix.guess,
         confidence=next((cause.confidence for cause in causes if cause.option in changed), None),
-        why=f"{fix.shown_by} with it" if fix.shown_by else fix.why_this,
+        why=why_of(fix.shown_by, document.abstained, fix.why_this),
     )
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from care_core.diagnose.outside.change import outside_option
+from care_core.ecosystems.ros.plugin_names import is_named_alike
 from care_core.ecosystems.vehicles import Kind, aliases_of
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import ConfigError, nearest
@@ -142,12 +143,14 @@ def _under(option: Variable, named: tuple[str, ...], schema: Schema) -> Variable
     """The option under these names, None where they are not all of its own, in its order, in one unit."""
     if named == option.parameters:
         return option
-    vehicle = schema.match.get("vehicle")
-    kinds = [kind for kind in _KINDS if kind == vehicle] or _KINDS
+    own = schema.match.get("stack") or schema.match.get("vehicle")
+    kinds = [kind for kind in (*_KINDS, "nav2") if kind == own] or _KINDS
+    if own == "nav2" and len(named) == len(option.parameters) and all(map(is_named_alike, option.parameters, named)):
+        return replace(option, parameters=named)
     for kind in kinds:
         spelled = [
-            next((one for one in aliases_of(own, kind) if one.name == name), None)
-            for own, name in zip(option.parameters, named, strict=False)
+            next((one for one in aliases_of(first, kind) if one.name == name), None)
+            for first, name in zip(option.parameters, named, strict=False)
         ]
         scales = {one.scale for one in spelled if one is not None}
         if len(named) == len(option.parameters) and None not in spelled and len(scales) == 1:

@@ -31,6 +31,8 @@ from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
 
 NAME_WIDTH, VERDICT_WIDTH = 30, 16
+ROOMY = 100
+"""Cells from which there is room for age and size beside the reason; the text below tells them, too."""
 SHORTEST_FOLDER = 10
 """Cells below which the end of a path tells nothing."""
 LOGS = "logs"
@@ -66,6 +68,7 @@ class LogsPage(Page):
     def __init__(self, workspace: Workspace, *, id: str | None = None) -> None:
         super().__init__(workspace, id=id)
         self._known: dict[Path, Known] = {}
+        self._name_width = NAME_WIDTH
 
     @property
     def session(self) -> Session:
@@ -134,6 +137,7 @@ class LogsPage(Page):
     def view(self) -> View:
         logs, now = self._logs, time.time()
         places = [log.path for log in logs]
+        self._name_width = max((self._named(path).cell_length for path in places), default=NAME_WIDTH)
         listing = Listing(
             len(logs),
             lambda i, width: (self._item(logs[i], now, width),),
@@ -172,12 +176,13 @@ class LogsPage(Page):
         mark = self.glyphs.here if log.path == self.session.path else " "
         known = self._known.get(log.path)
         verdict = Content("") if known is None else _status(known.status, self)
-        about = f" {age(now - log.modified_s):>10}  {size(log.size):>8}  "
+        is_told = known is not None and bool(known.words) and width < ROOMY
+        about = " " if is_told else f" {age(now - log.modified_s):>10}  {size(log.size):>8}  "
         named = self._named(log.path)
         line = Content.assemble(
             f"{mark} ",
             verdict.pad_right(VERDICT_WIDTH - verdict.cell_length),
-            named.pad_right(NAME_WIDTH - named.cell_length),
+            named.pad_right(self._name_width - named.cell_length),
             about,
         )
         if known is not None and known.words:

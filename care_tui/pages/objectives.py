@@ -120,5 +120,5 @@ class ObjectivesPage(DiagnosisPage):
         """Go to the causes: those of the fault under the cursor, else of the first fault."""
         if self.has_content and self.session.fault is None and self.session.first_fault():
             result = self.session.result
-            self.say(f"Nothing explains that one; these are the causes of {result.name if result else 'the fault'}.")
+            self.say(f"These are the causes of {result.name if result else 'the fault'}.")
         self.go_on()

@@ -30,6 +30,8 @@ class ReportPage(DiagnosisPage):
         Binding("c", "copy_commands", "Copy commands", id="report.copy"),
     ]
     _written = ""
+    _written_text: object = None
+    """What was on this page when it was written."""
 
     @property
     def _is_page(self) -> bool:
@@ -44,7 +46,10 @@ class ReportPage(DiagnosisPage):
             self.fetched(REPORT, lambda: self.workspace.engine.report(case, shown.name))
 
     def view_of_diagnosis(self) -> View:
-        tail = f"written to {clean(self._written)}" if self._written else "enter writes it, f changes the format"
+        tail = "enter writes it, f changes the format"
+        if self._written:
+            is_it = self._answers.get(REPORT) in (None, self._written_text)
+            tail = f"written to {clean(self._written)}" if is_it else f"not what {clean(self._written)} holds"
         as_text = ", its text here" if self._is_page else ""
         title = Content(f"Report as {self.session.format.label}{as_text}: {tail}")
         text = self._answers.get(REPORT)
@@ -75,6 +80,7 @@ class ReportPage(DiagnosisPage):
             written = Path(path)
             self.workspace.written.append(written)
             self._written = str(written.relative_to(Path.cwd()) if written.is_relative_to(Path.cwd()) else written)
+            self._written_text = self._answers.get(REPORT)
             self.show()
 
     def action_copy_commands(self) -> None:

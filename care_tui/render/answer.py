@@ -67,9 +67,9 @@ def _cause_and_change(session: Session, glyphs: Glyphs, *, is_low: bool) -> Iter
     change = _change(session, glyphs)
     if change is not None:
         yield change
-    elif diagnosis.abstained:
+    if diagnosis.abstained:
         yield _labelled("Change") + text(f"none advised: {diagnosis.abstained}", "$text-warning")
-    elif diagnosis.faults and not is_low:
+    elif change is None and diagnosis.faults and not is_low:
         yield _labelled("Change") + Content("none is known that helps")
 
 
@@ -95,7 +95,10 @@ def _change(session: Session, glyphs: Glyphs) -> Content | None:
         odds = promise(fix.odds, glyphs) + Content.styled(" a guess" if fix.is_guess else "", "$text-warning")
     beside = Content.styled("" if without is None else f"  without {percent(without)}", "dim")
     again = Content.styled("  unless it happens again", "$text-warning") if session.diagnosis.lost_by else Content()
-    return Content.assemble(_labelled("Change"), odds, "  ", text(name, "bold"), " ", change, more, beside, again)
+    is_advised = not session.only_asked and not session.diagnosis.abstained
+    return Content.assemble(
+        _labelled("Change" if is_advised else "Asked"), odds, "  ", text(name, "bold"), " ", change, more, beside, again
+    )
 
 
 def _limits(diagnosis: Diagnosis, *, is_low: bool) -> Iterator[Content]:

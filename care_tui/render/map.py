@@ -61,16 +61,20 @@ def map_rows(way: Way, marks: Sequence[Mark], width: int, height: int, glyphs: G
     legs = canvas.cells(canvas.line(way.legs), dotted=True) if way.legs else {}
     drawn = {cell: (sign, WANTED) for cell, sign in legs.items()}
     drawn |= {cell: (sign, ACTUAL) for cell, sign in canvas.cells(canvas.line(way.track)).items()}
-    signs = {**dict.fromkeys(way.legs, "o"), way.track[0]: "S", way.track[-1]: "E"}
-    signs |= {_at(way, mark.time_s): sign_of(mark, glyphs) for mark in marks}
-    for point, sign in signs.items():
+    told = [(_at(way, mark.time_s), sign_of(mark, glyphs)) for mark in marks]
+    faults = [(point, sign) for point, sign in told if sign == glyphs.fault]
+    # What is drawn later covers what was there: both ends stay in view beneath nothing but a fault.
+    ends = [(way.track[0], "S"), (way.track[-1], "E")]
+    for point, sign in (*((corner, "o") for corner in way.legs), *told, *ends, *faults):
         x, y = canvas.dot(point)
         drawn[x // canvas.across, y // canvas.down] = sign, "bold $text-error" if sign == glyphs.fault else "bold"
     rows = [Row(assembled([drawn.get((x, y), (" ", "")) for x in range(canvas.width)])) for y in range(canvas.height)]
     scale = f"{figures(canvas.metres * 10, 2)} m"
     asked = Content.assemble(("  ... asked for, o its corners", WANTED) if way.legs else "")
+    said = "".join(f"  {sign} {words}" for sign, words in ((glyphs.fault, "fault"), ("!", "warning"))
+                   if sign in {sign for _, sign in told})  # fmt: skip
     legend = Content.assemble(
-        f"{glyphs.rule * 10} {scale}  ", (f"{glyphs.root} track", ACTUAL), "  S start  E end", asked
+        f"{glyphs.rule * 10} {scale}  ", (f"{glyphs.root} track", ACTUAL), "  S start  E end", said, asked
     )
     return [*rows, Row(Content()), Row(legend)]
 

@@ -216,7 +216,7 @@ class CaseScreen(Screen[None]):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action == "move":
             return self.here in NAMES and 0 <= NAMES.index(self.here) + int(str(parameters[0])) < len(NAMES)
-        return True
+        return action != "back" or self._leads_back
 
     @on(Go)
     async def _wanted(self, event: Go) -> None:
@@ -239,6 +239,19 @@ class CaseScreen(Screen[None]):
         elif self._visited:
             place = self._visited.pop()
             await self._turn_to(place.page, place.index)
+        elif self._came_from_list:
+            await self._turn_to("logs")
+
+    @property
+    def _came_from_list(self) -> bool:
+        """Whether the list of a folder's logs lies behind what is in view."""
+        return self.workspace.folder is not None and self.here != "logs"
+
+    @property
+    def _leads_back(self) -> bool:
+        """Whether there is anything that Esc takes back."""
+        is_under_way = self.session.state == "loading" or bool(self.query_one(FilterBar).words)
+        return is_under_way or bool(self._visited) or self._came_from_list
 
     # The filter
 

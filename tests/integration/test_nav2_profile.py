@@ -19,7 +19,9 @@ from tests.conftest import Care
 from tests.courier import TOLERANCE, USUAL, deliver
 
 SAMPLES = Path(__file__).parents[2] / "samples"
-START = SAMPLES / "nav2_robot" / "start" / "nav2.yaml"
+STARTS = SAMPLES / "nav2_robot" / "start"
+PROFILES = [("nav2", "dwb"), ("nav2-mppi", "mppi"), ("nav2-rpp", "rpp")]
+"""With the controller that each was driven with."""
 FOLLOW, CHECKER = "/controller_server.FollowPath.", "/controller_server.general_goal_checker."
 SHIPPED = {
     f"{FOLLOW}max_vel_x": 0.26, f"{FOLLOW}max_speed_xy": 0.26, f"{FOLLOW}max_vel_theta": 1.0, f"{FOLLOW}acc_lim_x": 2.5,
@@ -46,17 +48,19 @@ def test_a_drive_is_read_under_the_names_of_nav2(tmp_path: Path) -> None:
     assert run.value("top_speed") == pytest.approx(0.26, abs=0.03)
 
 
-def test_defaults_are_those_that_the_reference_was_driven_with() -> None:
-    schema = load_profile("nav2").schema
-    driven = resolve(read_configs([str(START)]), {one for option in schema.options for one in readable(option)})
+@pytest.mark.parametrize(("name", "controller"), PROFILES)
+def test_defaults_are_those_that_the_reference_was_driven_with(name: str, controller: str) -> None:
+    schema, start = load_profile(name).schema, STARTS / f"{controller}.yaml"
+    driven = resolve(read_configs([str(start)]), {one for option in schema.options for one in readable(option)})
     for option in schema.options:
         assert {option_value(option, driven[one]) for one in readable(option)} == {option.default}, option.name
 
 
-def test_the_profile_is_of_one_controller_and_planner() -> None:
-    driven = parameters.read(START)
-    for name, text in load_profile("nav2").schema.plugins.items():
-        node, _, parameter = name.partition(".")
+@pytest.mark.parametrize(("name", "controller"), PROFILES)
+def test_each_profile_is_of_one_controller_and_planner(name: str, controller: str) -> None:
+    driven = parameters.read(STARTS / f"{controller}.yaml")
+    for key, text in load_profile(name).schema.plugins.items():
+        node, _, parameter = key.partition(".")
         assert text in str(driven[node][parameter])
 
 

@@ -130,3 +130,12 @@ async def test_the_name_of_a_log_does_not_steer_the_terminal(make_app: MakeApp) 
         drawn = "".join(segment.text for y in range(box.size.height) for segment in box.render_line(y))
         assert "\x1b" not in drawn
         assert "\x07" not in drawn
+
+
+async def test_what_was_decided_since_a_file_was_written_is_not_what_it_holds(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot, "6", "e", "enter", "4", "space", "6")
+        assert "not what 00000042.care.yaml holds" in title(app)
+        await settle(pilot, "4", "space", "6")
+        assert "written to 00000042.care.yaml" in title(app)

@@ -211,6 +211,8 @@ async def test_a_folder_lists_its_logs_with_verdicts_and_enter_opens_one(tmp_pat
         await settle(pilot, "slash", *"flight", "enter", "enter")
         await settle(pilot)
         assert walk(app).here == "objectives"
+        await settle(pilot, "escape", "escape")
+        assert walk(app).here == "logs"
 
 
 @needs_sample

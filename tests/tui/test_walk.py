@@ -202,6 +202,14 @@ async def test_the_boxes_decide_the_probability_and_what_diff_and_report_hold(ma
         assert text(app) == "report: yaml\n  WPNAV_SPEED: 1400"
 
 
+async def test_where_nothing_is_advised_a_ticked_change_is_only_asked_about(make_app: MakeApp) -> None:
+    app = make_app(replace(sample.faulty(), fix=None, abstained="motor 4 lost thrust"))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "4", "space")
+        assert "Asked    " in answer(app)
+        assert "Change   none advised: motor 4 lost thrust" in answer(app)
+
+
 async def test_u_takes_every_change_of_the_basket_back(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
@@ -317,7 +325,7 @@ async def test_enter_on_what_was_not_evaluated_leads_to_the_fault_that_has_cause
         await settle(pilot, "enter")
         assert title(app).startswith("Causes of mission_time")
         assert "LAND_SPEED" in items(app)
-        assert "these are the causes of mission_time" in app.title
+        assert "These are the causes of mission_time" in app.title
 
 
 async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app: MakeApp) -> None:

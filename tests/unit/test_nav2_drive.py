@@ -10,7 +10,7 @@ import pytest
 
 from nav2_robot.__main__ import main
 
-START = Path(__file__).parents[2] / "samples" / "nav2_robot" / "start" / "nav2.yaml"
+START = Path(__file__).parents[2] / "samples" / "nav2_robot" / "start" / "dwb.yaml"
 
 
 def test_nav2_reaches_the_goals_and_the_drive_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

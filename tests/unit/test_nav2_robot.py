@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.application.case import Request, open_case
+from care_core.collect.campaign import read_campaign
 from care_core.logs.opening import open_log
 from nav2_robot import again, clock, laser, parameters
 from nav2_robot.__main__ import main
@@ -26,7 +27,7 @@ from nav2_robot.servers import installed
 from nav2_robot.standin import StandIn, plan
 from nav2_robot.world import CELL_M, Conditions, Passage, World
 
-START = Path(__file__).parents[2] / "samples" / "nav2_robot" / "start" / "nav2.yaml"
+START = Path(__file__).parents[2] / "samples" / "nav2_robot" / "start" / "dwb.yaml"
 ROOM = World(
     walls=((-1.2, -2.2, 6.2, -2.0), (-1.2, 2.0, 6.2, 2.2), (-1.2, -2.0, -1.0, 2.0), (6.0, -2.0, 6.2, 2.0)),
     clutter=(),
@@ -302,3 +303,11 @@ def test_the_robot_is_a_stranger_to_the_program_and_only_its_node_needs_ros() ->
             named += [one.name for one in line.names] if isinstance(line, ast.Import) else []
             strange = {"care_core", "care_tui"} | ({"rclpy"} if path.name != "node.py" else set())
             assert not {name.partition(".")[0] for name in named} & strange, path
+
+
+@pytest.mark.parametrize(("controller", "profile"), [("dwb", "nav2"), ("mppi", "nav2-mppi"), ("rpp", "nav2-rpp")])
+def test_each_controller_has_a_campaign_that_begins(tmp_path: Path, controller: str, profile: str) -> None:
+    assert main(["--start", str(tmp_path), "--controller", controller]) == 0
+    campaign = read_campaign(tmp_path / "campaign.yaml")
+    assert campaign.schema.name == profile
+    assert campaign.space.allows(campaign.space.reference)

@@ -6,6 +6,7 @@ import pytest
 
 from care_core.diagnose.next_step import bench, next_step, trial, was_upset
 from care_core.diagnose.records import Diagnosis, Hypothesis
+from care_core.diagnose.verdict import verdict_of
 from care_core.ecosystems.findings import Finding, Health
 from care_core.records import replace
 from care_core.run import Check, Evidence
@@ -82,3 +83,9 @@ def test_what_can_be_put_right_at_once_comes_first() -> None:
     told = replace(changed, hypotheses=(Hypothesis("parameter", "SERVO2_FUNCTION", 0.9), Hypothesis("chance", "", 0.1)))
     said = next_step(told, has_failed=True)
     assert said == "put SERVO2_FUNCTION back as the findings say, then try it in the simulator or a low hover"
+
+
+def test_a_change_that_was_chosen_by_hand_does_not_come_before_what_failed() -> None:
+    chosen = replace(failed(THRUST, fixed=True), abstained="too little thrust: nothing is changed until that is mended")
+    assert next_step(chosen, has_failed=True).startswith("check on the bench: too little thrust; then try it")
+    assert "chosen by hand; no change is advised: too little thrust" in str(verdict_of(chosen).advice)

@@ -1,0 +1,71 @@
+"""Nav2's plugins under the names that a robot gave them: lists of their server name them, classes say what they are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from care_core.run import Setting
+
+_LISTS = {
+    "FollowPath": "controller_plugins",
+    "GridBased": "planner_plugins",
+    "general_goal_checker": "goal_checker_plugins",
+    "progress_checker": "progress_checker_plugins",
+}
+"""Usual name of a plugin, and the list of its server that holds the names which a robot has for such."""
+_OBSTACLES = ("ObstacleLayer", "VoxelLayer")
+_LAYERS = {"obstacle_layer": _OBSTACLES, "voxel_layer": _OBSTACLES, "inflation_layer": ("InflationLayer",)}
+"""Usual name of a costmap's layer, and the classes that read the same parameters."""
+_SOURCE = "scan"
+"""Usual name of what a layer gets its obstacles from."""
+_NAME = r"[\w-]+"
+
+Settings = Mapping[str, Sequence[Setting]]
+
+
+def named_here(name: str, settings: Settings) -> str:
+    """What a robot calls a parameter that has this name where plugins have their usual ones.
+
+    The name itself where the robot has it, or where several plugins might be meant.
+    """
+    node, _, rest = name.partition(".")
+    usual, _, tail = rest.partition(".")
+    if name in settings or not tail:
+        return name
+    own = _only(_names_of(usual, node, settings), usual)
+    source, _, last = tail.partition(".")
+    if usual in _LAYERS and source == _SOURCE:
+        tail = f"{_only(_words(settings, f'{node}.{own}.observation_sources'), source)}.{last}"
+    return f"{node}.{own}.{tail}"
+
+
+def is_named_alike(name: str, other: str) -> bool:
+    """Whether a robot may call a parameter by the other name: only plugins and sources are called as one likes."""
+    node, _, rest = name.partition(".")
+    usual, _, tail = rest.partition(".")
+    if usual not in _LISTS and usual not in _LAYERS:
+        return name == other
+    parts = [_NAME if usual in _LAYERS and part == _SOURCE else re.escape(part) for part in tail.split(".")]
+    return re.fullmatch(rf"{re.escape(node)}\.{_NAME}\.{re.escape('.').join(parts)}", other) is not None
+
+
+def _names_of(usual: str, node: str, settings: Settings) -> list[str]:
+    """The names that a robot has for plugins of a kind."""
+    if usual in _LISTS:
+        return _words(settings, f"{node}.{_LISTS[usual]}")
+    kinds = _LAYERS.get(usual, ())
+    return [one for one in _words(settings, f"{node}.plugins") if _class(settings, f"{node}.{one}.plugin") in kinds]
+
+
+def _only(names: Sequence[str], usual: str) -> str:
+    return names[0] if len(names) == 1 else usual
+
+
+def _words(settings: Settings, name: str) -> list[str]:
+    return re.findall(_NAME, str(settings[name][-1].value)) if name in settings else []
+
+
+def _class(settings: Settings, name: str) -> str:
+    """The class of a plugin without its package, which releases write as `package::Class` or `package/Class`."""
+    return re.split(r"::|/", str(settings[name][-1].value))[-1] if name in settings else ""
