@@ -110,6 +110,14 @@ SOURCES = {
         "with a failing part that missed a goal, 25 reached all with that part whole, and none of those was advised a "
         "parameter.",
     ),
+    "nav2-mppi": Source(
+        ("data/nav2-mppi/table.tar.xz",),
+        "@MPPI@",
+    ),
+    "nav2-rpp": Source(
+        ("data/nav2-rpp/table.tar.xz",),
+        "@RPP@",
+    ),
     "husky-care": Source(
         ("data/care/care_husky_sim_399.csv",),
         "399 Husky missions in Gazebo from the CaRE artifact (Hossen et al. 2023, MIT license).",

@@ -30,15 +30,20 @@ from nav2_robot.world import WORLDS, Conditions, described
 _DRAWN = "drawn"
 _CONTROLLER_HZ = 20.0
 """Nav2's, where the file does not say."""
-_FILES = ("nav2.yaml", "campaign.yaml")
+_PROFILES = {"dwb": "nav2", "mppi": "nav2-mppi", "rpp": "nav2-rpp"}
+"""By the controller that Nav2 drives with; each has a parameter file of its name in `start`."""
+_LIMITS = {
+    "mppi": ("controller_frequency * model_dt >= 1   # MPPI refuses a period longer than its step",),
+    "rpp": ("min_lookahead_dist <= max_lookahead_dist", "regulated_min_speed <= desired_linear_vel"),
+}
+"""What no mission of a controller's campaign breaks."""
 
 
 def main(words: list[str]) -> int:
     """Drive, or write the files to begin with; the exit code."""
     asked = _arguments(words)
     if asked.start is not None:
-        here = Path(__file__).parent / "start"
-        write_start({name: (here / name).read_text(encoding="utf-8") for name in _FILES}, asked.start)
+        write_start(_start_files(asked.controller), asked.start)
         return 0
     try:
         settings = parameters.read(asked.params)
@@ -64,6 +69,18 @@ def main(words: list[str]) -> int:
         asked.truth.write_text(json.dumps({**driven, **told, **_truth(robots[-1])}, indent=1) + "\n", encoding="utf-8")
     print(f"{told['reached']} of {len(conditions.world.goals)} goals, {told['mission_s']:.0f} s")
     return 0
+
+
+def _start_files(controller: str) -> dict[str, str]:
+    """The files to begin with, by name: what Nav2 is driven with, and a campaign of its profile."""
+    here = Path(__file__).parent / "start"
+    campaign = (here / "campaign.yaml").read_text(encoding="utf-8")
+    limits = "".join(f"\n  - {limit}" for limit in _LIMITS.get(controller, ()))
+    return {
+        "nav2.yaml": (here / f"{controller}.yaml").read_text(encoding="utf-8"),
+        "campaign.yaml": campaign.replace("profile: nav2\n", f"profile: {_PROFILES[controller]}\n")
+        + (f"\nlimits:{limits}\n" if limits else ""),
+    }
 
 
 def _stand_in(path: Path, robot: Robot, settings: Parameters) -> dict[str, Any]:
@@ -123,6 +140,8 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--outputs", type=Path, metavar="DIR", help="where the servers' outputs go; beside the log")
     parser.add_argument("--truth", type=Path, metavar="FILE", help="what the simulator knows of the run, as JSON")
     parser.add_argument("--start", type=Path, metavar="DIR", help="write the files to begin with")
+    parser.add_argument("--controller", choices=sorted(_PROFILES), default="dwb",
+                        help="with --start: the controller that Nav2 drives with")  # fmt: skip
     asked = parser.parse_args(words)
     if asked.start is None and (asked.params is None or asked.logs is None):
         parser.error("--params and --logs belong together")

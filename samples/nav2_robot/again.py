@@ -57,7 +57,7 @@ def reaches_all(truth: Truth, folder: Path, command: Sequence[str]) -> bool | No
 
 def answer(truth: Truth, command: Sequence[str]) -> dict[str, Any]:
     """What care makes of the log: its first finding, whether it names the part, the options that it would change."""
-    words = [*command, "triage", truth["log"], "--profile", "nav2", "--json", "--no-history"]
+    words = [*command, "triage", truth["log"], "--json", "--no-history"]
     told = json.loads(subprocess.run(words, check=False, capture_output=True, text=True).stdout)
     findings = [finding for finding in told["findings"] if finding["severity"] != "info"]
     return {

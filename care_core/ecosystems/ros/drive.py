@@ -333,8 +333,8 @@ class Drive(RunModel):
 
     @property
     def missed_s(self) -> float:
-        """When the first goal was missed; the end where none was."""
-        return min((one.end_s for one in self.missed), default=self.duration_s)
+        """When the first goal that was missed was sent; the end where none was missed."""
+        return min((one.sent_s for one in self.missed), default=self.duration_s)
 
     def severity(self, onset_s: float, otherwise: Severity = "warning") -> Severity:
         """How much something that began then matters: critical where a goal failed afterwards, or is left open at the
