@@ -10,8 +10,8 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from care_core.collect.constraints import parse_constraint
 from care_core.collect.space import Axis, Space
+from care_core.constraints import parse_constraint
 from care_core.variables import Role, Variable
 from care_samples.robot.mission import DEFAULTS, Robot
 from care_samples.robot.recording import write_bag

@@ -26,6 +26,7 @@ from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import LEAST, TAIL, Mechanism, Posterior, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_CARRY_OVER, Mediation, Model, NoiseCarryOver, OutcomeRecord, StageRecord
 from care_core.causal.posteriors import PosteriorCache
+from care_core.constraints import Constraint
 from care_core.records import Record, field, replace
 from care_core.run import is_known
 from care_core.variables import Threshold, Variable
@@ -71,6 +72,8 @@ class CounterfactualQuery(Record, eq=False, dict=True):
     """What the profile says of each variable, by name."""
     kept: frozenset[str] = frozenset()
     """Options that stay as they are."""
+    constraints: tuple[Constraint, ...] = ()
+    """What the options have to keep together."""
     assumed: frozenset[str] = frozenset()
     """Options that no source of the run holds: taken to be at their reference."""
     wary_from: Config | None = None
@@ -83,6 +86,10 @@ class CounterfactualQuery(Record, eq=False, dict=True):
     def _answers(self) -> dict[str, _Answers]:
         """What was worked out already: the search asks for most configurations many times over."""
         return {}
+
+    def allows(self, config: Config) -> bool:
+        """Whether a configuration keeps every constraint that the run's own keeps."""
+        return all(one.holds(config) or not one.holds(self.config) for one in self.constraints)
 
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""

@@ -16,11 +16,11 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from care_core import plain_yaml
-from care_core.collect.constraints import parse_constraint
 from care_core.collect.sampling import Method
 from care_core.collect.space import Axis, Space
 from care_core.configs.driven import option_value, readable
 from care_core.configs.loading import read_configs, resolve, split_name
+from care_core.constraints import parse_constraint
 from care_core.errors import UsageError, nearest
 from care_core.files import PROFILE_FILE, profile_folders, read_small_text
 from care_core.profile.schema import Schema
@@ -194,7 +194,8 @@ def _space(data: _Campaign, schema: Schema, parameters: Sequence[str]) -> Space:
     axes = [Axis(schema.variables[name], *bounds) for name, bounds in ranges.items()]
     if not axes:
         raise UsageError("No option varies.", hint="Give one a range under 'options'.", where="options")
-    return Space(axes, reference, [parse_constraint(text, reference) for text in data.limits], left_out)
+    known = [limit for limit in schema.constraints if limit.options <= reference.keys()]
+    return Space(axes, reference, [*known, *(parse_constraint(text, reference) for text in data.limits)], left_out)
 
 
 def reference_of(schema: Schema, parameters: Sequence[str]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.collect.constraints import Constraint
+from care_core.constraints import Constraint
 from care_core.errors import UsageError
 from care_core.records import Record
 from care_core.variables import Variable

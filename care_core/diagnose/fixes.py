@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,21 +58,33 @@ def search(query: CounterfactualQuery, candidates: Collection[str]) -> list[tupl
     Beam search: every option alone back to its reference (yes-or-no options and codes to any other value), then the
     best sets widened by one option at a time. `settled` then looks for values nearer to the run's.
     """
-    values = {name: found for name in candidates if (found := _starts(query, name))}
+    values = {name: found for name in _with_partners(query, candidates) if (found := _starts(query, name))}
     singles = [{name: value} for name, found in values.items() for value in found]
-    beam = _ranked(query, singles)[:BEAM]
+    ranked = _ranked(query, singles)
     found_sets = []
-    while beam:
+    # What breaks a constraint alone may keep it with another change beside it: it is widened, and not suggested.
+    while beam := [pair for pair in ranked if query.allows({**query.config, **pair[0]})][:BEAM]:
         found_sets.append(_surest(query, beam))
         if len(found_sets) == MAX_CHANGES:
             break
-        beam = _ranked(query, _widened((a for a, _ in beam), values))[:BEAM]
+        ranked = _ranked(query, _widened((a for a, _ in ranked[:BEAM]), values))
     return found_sets
 
 
+def _with_partners(query: CounterfactualQuery, candidates: Collection[str]) -> list[str]:
+    """The options, and those that a constraint binds to one of them: it may only be changed together with them."""
+    bound = (one.options for one in query.constraints if not one.options.isdisjoint(candidates))
+    partners = sorted({name for options in bound for name in options} - set(candidates) - query.kept)
+    return [*candidates, *partners]
+
+
 def _starts(query: CounterfactualQuery, name: str) -> tuple[float, ...]:
+    """The reference; where that alone breaks a constraint, the value next to it that does not as well."""
     values = candidate_values(query, name)
-    return values if _is_unordered(query.variables[name]) else values[:1]
+    if _is_unordered(query.variables[name]):
+        return values
+    allowed = (value for value in values if query.allows({**query.config, name: value}))
+    return tuple(dict.fromkeys((*values[:1], *islice(allowed, 1))))
 
 
 def _is_unordered(option: Variable) -> bool:
@@ -94,13 +106,15 @@ def settled(query: CounterfactualQuery, assignment: Assignment) -> tuple[Assignm
     for name in assignment:
         if _is_unordered(query.variables[name]):
             continue
-        values = candidate_values(query, name)
-        configs = [{**query.config, **chosen, name: value} for value in values]
+        configs = [{**query.config, **chosen, name: value} for value in candidate_values(query, name)]
+        configs = [config for config in configs if query.allows(config)]
+        if not configs:
+            continue
         does = query.probability(configs) >= floor
         edge = _edge(does)
         if edge:  # most often this run itself leaves nothing but the reference
             edge = _edge(does & (wary.probability(configs) >= _floor(before, assignment)))
-        chosen[name] = values[edge]
+        chosen[name] = configs[edge][name]
     return chosen, float(query.probability([{**query.config, **chosen}])[0])
 
 
@@ -118,7 +132,8 @@ def _floor(query: CounterfactualQuery, assignment: Assignment) -> float:
 
 def best_alone(query: CounterfactualQuery, name: str) -> tuple[float, float] | None:
     """The value of one option to suggest when nothing else changes, and its probability."""
-    ranked = _ranked(query, [{name: value} for value in _starts(query, name)])
+    allowed = (value for value in _starts(query, name) if query.allows({**query.config, name: value}))
+    ranked = _ranked(query, [{name: value} for value in allowed])
     if not ranked:
         return None
     assignment, probability = settled(query, ranked[0][0])

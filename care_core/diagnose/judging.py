@@ -222,6 +222,7 @@ def query_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> Coun
         reference=reference,
         variables=profile.schema.variables,
         kept=frozenset(kept),
+        constraints=profile.schema.constraints,
         assumed=frozenset(option.name for option in profile.schema.options) - frozenset(run.config),
     )
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from care_core.causal.nominal import Nominal, nominal
 from care_core.configs.driven import same_value
+from care_core.constraints import Constraint
 from care_core.records import Record, field, replace
 from care_core.run import Evidence
 from care_core.variables import Role, Threshold, Variable
@@ -75,6 +76,8 @@ class Schema(Record):
     carried_over: str = ""
     """What the profile was learned from, where that is not what its logs are of: then it names suspects and advises no
     change. Empty where it is."""
+    constraints: tuple[Constraint, ...] = ()
+    """What the stack asks of its options together: no suggestion and no mission of a campaign breaks it."""
     plugins: Mapping[str, str] = field(default_factory=dict)
     """Parameter that names a part of the stack -> what its value contains where it is the part learned from."""
     firmware_window: tuple[tuple[int, ...], tuple[int, ...]] | None = None

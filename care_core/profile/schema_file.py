@@ -15,8 +15,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from care_core import plain_yaml
 from care_core.causal.nominal import nominal
+from care_core.constraints import Constraint, parse_constraint
 from care_core.ecosystems.vehicles import Kind as VehicleKind
-from care_core.errors import ProfileError, nearest
+from care_core.errors import ProfileError, UsageError, nearest
 from care_core.logs import formats
 from care_core.profile.patterns import repeats_of
 from care_core.profile.schema import EvidenceRule, Schema, Side
@@ -218,6 +219,7 @@ class _Profile(Strict):
     observational: bool = False
     carried_over: str = ""
     plugins: dict[str, str] = Field(default_factory=dict)
+    limits: list[str] = Field(default_factory=list)
     mission: dict[str, Any] = Field(default_factory=dict)
     evidence: list[_EvidenceRule] = Field(default_factory=list)
     circumstances: dict[str, dict[str, Side]] = Field(default_factory=dict)
@@ -252,6 +254,8 @@ class _Profile(Strict):
     def _names_are_declared(self) -> _Profile:
         options = [name for name, variable in self.variables.items() if variable.role is Role.OPTION]
         met = [name for name, variable in self.variables.items() if variable.role in (Role.CONTEXT, Role.METRIC)]
+        for text in self.limits:
+            _constraint(text, options)
         for rule in self.evidence:
             _declared(rule.options, options, f"evidence '{rule.text}' names the option")
             if rule.circumstance is not None:
@@ -269,6 +273,14 @@ class _Profile(Strict):
             if variable.events is not None:
                 _declared(variable.events.values(), met, "'events' names the context or metric")
         return self
+
+
+def _constraint(text: str, options: Iterable[str]) -> Constraint:
+    """A limit between options. Raises ValueError."""
+    try:
+        return parse_constraint(text, dict.fromkeys(options))
+    except UsageError as err:
+        raise ValueError(f"under 'limits' {err.message} {err.hint}".strip()) from err
 
 
 def _declared(names: Iterable[str], known: Iterable[str], what: str) -> None:
@@ -337,6 +349,7 @@ def _to_schema(data: _Profile) -> Schema:
         observational=data.observational,
         carried_over=data.carried_over,
         plugins=data.plugins,
+        constraints=tuple(_constraint(text, variables) for text in data.limits),
         mission=data.mission,
         evidence=tuple(map(_to_rule, data.evidence)),
         variables=variables,

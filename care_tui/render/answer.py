@@ -23,7 +23,10 @@ def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) 
     """The answer as far as it is known; `is_low`: there is room for few lines."""
     name = "" if session.path is None else clean(session.path.name)
     if session.state == "empty":
-        return [Content.styled("No log is open", "bold"), Content("L lists the logs that there are: Enter opens one, o any other")]
+        return [
+            Content.styled("No log is open", "bold"),
+            Content("L lists the logs that there are: Enter opens one, o any other"),
+        ]
     if session.state == "error" and session.error is not None:
         return [
             Content.styled(f"{glyphs.fault} No diagnosis of {name}", "bold $text-error"),

@@ -32,11 +32,6 @@ _CONTROLLER_HZ = 20.0
 """Nav2's, where the file does not say."""
 _PROFILES = {"dwb": "nav2", "mppi": "nav2-mppi", "rpp": "nav2-rpp"}
 """By the controller that Nav2 drives with; each has a parameter file of its name in `start`."""
-_LIMITS = {
-    "mppi": ("controller_frequency * model_dt >= 1   # MPPI refuses a period longer than its step",),
-    "rpp": ("min_lookahead_dist <= max_lookahead_dist", "regulated_min_speed <= desired_linear_vel"),
-}
-"""What no mission of a controller's campaign breaks."""
 
 
 def main(words: list[str]) -> int:
@@ -75,11 +70,9 @@ def _start_files(controller: str) -> dict[str, str]:
     """The files to begin with, by name: what Nav2 is driven with, and a campaign of its profile."""
     here = Path(__file__).parent / "start"
     campaign = (here / "campaign.yaml").read_text(encoding="utf-8")
-    limits = "".join(f"\n  - {limit}" for limit in _LIMITS.get(controller, ()))
     return {
         "nav2.yaml": (here / f"{controller}.yaml").read_text(encoding="utf-8"),
-        "campaign.yaml": campaign.replace("profile: nav2\n", f"profile: {_PROFILES[controller]}\n")
-        + (f"\nlimits:{limits}\n" if limits else ""),
+        "campaign.yaml": campaign.replace("profile: nav2\n", f"profile: {_PROFILES[controller]}\n"),
     }
 
 

@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.causal.counterfactual import CounterfactualQuery
+from care_core.constraints import parse_constraint
 from care_core.diagnose.fixes import (
     MAX_CHANGES,
     NEARLY,
@@ -194,3 +195,22 @@ def test_an_operator_is_told_what_a_change_takes() -> None:
     assert change_notes(BY_NAME["accel"]) == ("takes effect after a reboot",)
     assert change_notes(BY_NAME["radius"]) == ("sets 2 keys: /a/radius, /b/radius",)
     assert change_notes(BY_NAME["speed"]) == ()
+
+
+def test_what_options_keep_together_no_suggestion_breaks(planted: Profile) -> None:
+    """The reference of `reserve` is 20: where it must stay above ten times a speed of 3.5, another value or a pair."""
+    kept = parse_constraint("reserve >= 10 * speed", DEFAULTS)
+    here = replace(planted_query(planted, reserve=58, speed=3.5), constraints=(kept,))
+    alone = best_alone(here, "reserve")
+    assert alone is None or alone[0] >= 35.0
+    for assignment, probability in search(here, ["reserve"]):
+        assert here.allows({**here.config, **assignment})
+        chosen, _ = settled(here, assignment)
+        assert here.allows({**here.config, **chosen})
+        assert 0.0 <= probability <= 1.0
+
+
+def test_a_constraint_that_the_run_breaks_itself_forbids_nothing(planted: Profile) -> None:
+    kept = parse_constraint("reserve <= speed", DEFAULTS)
+    here = planted_query(planted, reserve=58)
+    assert search(replace(here, constraints=(kept,)), ["reserve"]) == search(here, ["reserve"])

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.ros.plugin_names import is_named_alike, named_here
+from care_core.errors import ProfileError
 from care_core.extract.coverage import cover
 from care_core.extract.fit import fit_of
 from care_core.extract.parameter_aliases import with_logged_names
 from care_core.extract.select import choose_profile
+from care_core.files import bundled
 from care_core.logs.opening import open_log
+from care_core.profile.schema_file import parsed
 from care_core.profile.store import load_profile
 from care_core.run import Setting
 from tests.courier import TOLERANCE, USUAL, deliver
@@ -103,3 +106,19 @@ def test_the_controller_behind_a_rotation_shim_is_the_one_that_counts(tmp_path: 
     names = {f"{FOLLOW}plugin": shim, f"{FOLLOW}primary_controller": behind}
     log = open_log(logged(tmp_path / "a.mcap", **names))
     assert (fit_of(log, cover(log, load_profile("nav2-rpp").schema)).verdict != "no") is fits
+
+
+def test_no_suggestion_for_mppi_has_a_step_shorter_than_that_of_control() -> None:
+    schema = load_profile("nav2-mppi").schema
+    config = {option.name: option.default or 0.0 for option in schema.options}
+    (kept,) = schema.constraints
+    assert kept.holds({**config, "model_dt": 0.1, "controller_frequency": 10.0})
+    assert not kept.holds({**config, "controller_frequency": 10.0})
+
+
+@pytest.mark.parametrize("text", ["vx_max >= nothing", "import os", "vx_max"])
+def test_a_limit_that_is_none_is_said(text: str) -> None:
+    whole = (bundled("profiles", "nav2-mppi") / "profile.yaml").read_text()
+    wrong = whole.replace("controller_frequency * model_dt >= 1", text)
+    with pytest.raises(ProfileError, match="Under 'limits'"):
+        parsed(wrong, Path("profile.yaml"))

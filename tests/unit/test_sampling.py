@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.collect.constraints import parse_constraint
 from care_core.collect.sampling import Method, one_at_a_time, points, repeats_among, with_repeats
 from care_core.collect.space import Axis, Space
+from care_core.constraints import parse_constraint
 from care_core.errors import UsageError
 from care_core.variables import Role, Variable
 from tests.campaigns import space

@@ -1,4 +1,5 @@
-"""Constraints of a campaign: inequalities between options, written as an operator writes them and never executed.
+"""Constraints: inequalities between options that no mission of a campaign and no suggestion breaks, written as an
+operator writes them and never executed.
 
 `max_vel_x <= 0.8`, `0.2 <= inflation_radius`, `max_vel_x * sim_time <= inflation_radius + 1.5`: names of options,
 numbers, `+ - * /`, brackets, and `< <= > >=`. Whatever else a text holds is refused.
@@ -10,6 +11,7 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 
 from care_core.errors import UsageError, nearest
 from care_core.records import Record
@@ -29,27 +31,27 @@ _COMPARISONS: Mapping[type, Callable[[float, float], bool]] = {
 _LONGEST = 500
 
 
-class Constraint(Record, eq=False):
+class Constraint(Record):
     """One inequality; `holds` says whether a configuration keeps it."""
 
     text: str
-    _tree: ast.Compare
 
     def holds(self, config: Mapping[str, float]) -> bool:
         """Whether it is kept; one that cannot be computed (a division by zero) is not."""
+        tree = _tree(self.text)
         try:
-            sides = [_value(side, config) for side in (self._tree.left, *self._tree.comparators)]
+            sides = [_value(side, config) for side in (tree.left, *tree.comparators)]
         except (ZeroDivisionError, OverflowError):
             return False
         if not all(map(math.isfinite, sides)):
             return False
-        pairs = zip(self._tree.ops, sides, sides[1:], strict=False)
+        pairs = zip(tree.ops, sides, sides[1:], strict=False)
         return all(_COMPARISONS[type(op)](a, b) for op, a, b in pairs)
 
     @property
     def options(self) -> frozenset[str]:
         """The options that it names."""
-        return frozenset(node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name))
+        return frozenset(node.id for node in ast.walk(_tree(self.text)) if isinstance(node, ast.Name))
 
 
 def parse_constraint(text: str, options: Mapping[str, object]) -> Constraint:
@@ -58,14 +60,7 @@ def parse_constraint(text: str, options: Mapping[str, object]) -> Constraint:
     Raises:
         UsageError: it is not an inequality, or names what is not an option.
     """
-    hint = "Write an inequality of options and numbers, such as 'max_vel_x * sim_time <= 1.5'."
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body if len(text) <= _LONGEST else None
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        tree = None
-    if not isinstance(tree, ast.Compare) or not all(map(_is_allowed, _parts(tree))):
-        raise UsageError(f"'{text[:80]}' is not a limit.", hint=hint, where="limits")
-    constraint = Constraint(text.strip(), tree)
+    constraint = Constraint(text.strip())
     for name in sorted(constraint.options):
         if name not in options:
             raise UsageError(
@@ -74,6 +69,19 @@ def parse_constraint(text: str, options: Mapping[str, object]) -> Constraint:
                 where="limits",
             )
     return constraint
+
+
+@cache
+def _tree(text: str) -> ast.Compare:
+    """The inequality that a text is. Raises UsageError."""
+    hint = "Write an inequality of options and numbers, such as 'max_vel_x * sim_time <= 1.5'."
+    try:
+        tree = ast.parse(text, mode="eval").body if len(text) <= _LONGEST else None
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        tree = None
+    if not isinstance(tree, ast.Compare) or not all(map(_is_allowed, _parts(tree))):
+        raise UsageError(f"'{text[:80]}' is not a limit.", hint=hint, where="limits")
+    return tree
 
 
 def _parts(tree: ast.Compare) -> Iterator[ast.AST]:
