@@ -118,3 +118,10 @@ def test_nav2_configuration_files_are_read_under_the_same_names(recorded: Path) 
     assert held["/local_costmap/local_costmap.inflation_layer.inflation_radius"].value == 0.55
     assert held[f"{CHECKER}xy_goal_tolerance"].value == 0.25
     assert len(held) >= 15
+
+
+def test_a_mission_that_mppi_lost_is_led_back_to_the_weight_of_its_goal(care: Care) -> None:
+    report = json.loads(care("triage", SAMPLES / "nav2_mppi_failed.mcap", "--json").stdout)
+    assert (report["profile"]["name"], report["fit"]["verdict"]) == ("nav2-mppi", "fits")
+    assert report["hypotheses"][0]["name"] == "goal_weight"
+    assert [(change["option"], change["to"]) for change in report["fix"]["changes"]] == [("goal_weight", 5.0)]
