@@ -35,8 +35,8 @@ def keys_of(*bindings: Iterable[BindingType]) -> list[str]:
 
 
 def strangers(page: int) -> list[BindingType]:
-    """What the keys of single pages do, one in three from another on each page: all are pressed on some page."""
-    return one_in(3, DOES, first=page % 3)
+    """What the keys of single pages do, one in seven from another on each page: all are pressed on some page."""
+    return one_in(7, DOES, first=page % 7)
 
 
 HERE = (CareApp.BINDINGS, CaseScreen.BINDINGS)
