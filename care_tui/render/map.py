@@ -57,11 +57,13 @@ class _Canvas:
 
 def map_rows(way: Way, marks: Sequence[Mark], width: int, height: int, glyphs: Glyphs) -> list[Row]:
     """The map in so many cells, with what its signs mean."""
-    canvas = _Canvas(way, width, max(height - 2, 4), ascii=glyphs is ASCII)
+    told = [(_at(way, mark.time_s), sign_of(mark, glyphs)) for mark in marks]
+    seen = {sign for _, sign in told}
+    meant = [f"{sign} {word}" for sign, word in ((glyphs.fault, "fault"), ("!", "warning")) if sign in seen]
+    canvas = _Canvas(way, width, max(height - 2 - bool(meant), 4), ascii=glyphs is ASCII)
     legs = canvas.cells(canvas.line(way.legs), dotted=True) if way.legs else {}
     drawn = {cell: (sign, WANTED) for cell, sign in legs.items()}
     drawn |= {cell: (sign, ACTUAL) for cell, sign in canvas.cells(canvas.line(way.track)).items()}
-    told = [(_at(way, mark.time_s), sign_of(mark, glyphs)) for mark in marks]
     faults = [(point, sign) for point, sign in told if sign == glyphs.fault]
     # What is drawn later covers what was there: both ends stay in view beneath nothing but a fault.
     ends = [(way.track[0], "S"), (way.track[-1], "E")]
@@ -71,12 +73,10 @@ def map_rows(way: Way, marks: Sequence[Mark], width: int, height: int, glyphs: G
     rows = [Row(assembled([drawn.get((x, y), (" ", "")) for x in range(canvas.width)])) for y in range(canvas.height)]
     scale = f"{figures(canvas.metres * 10, 2)} m"
     asked = Content.assemble(("  ... asked for, o its corners", WANTED) if way.legs else "")
-    said = "".join(f"  {sign} {words}" for sign, words in ((glyphs.fault, "fault"), ("!", "warning"))
-                   if sign in {sign for _, sign in told})  # fmt: skip
     legend = Content.assemble(
-        f"{glyphs.rule * 10} {scale}  ", (f"{glyphs.root} track", ACTUAL), "  S start  E end", said, asked
+        f"{glyphs.rule * 10} {scale}  ", (f"{glyphs.root} track", ACTUAL), "  S start  E end", asked
     )
-    return [*rows, Row(Content()), Row(legend)]
+    return [*rows, Row(Content()), Row(legend), *([Row(Content("  ".join(meant)))] if meant else [])]
 
 
 def _at(way: Way, time_s: float) -> Point:
