@@ -63,7 +63,7 @@ def search(query: CounterfactualQuery, candidates: Collection[str]) -> list[tupl
     ranked = _ranked(query, singles)
     found_sets = []
     # What breaks a constraint alone may keep it with another change beside it: it is widened, and not suggested.
-    while beam := [pair for pair in ranked if query.allows({**query.config, **pair[0]})][:BEAM]:
+    while beam := list(islice((one for one in ranked if query.allows({**query.config, **one[0]})), BEAM)):
         found_sets.append(_surest(query, beam))
         if len(found_sets) == MAX_CHANGES:
             break

@@ -209,20 +209,21 @@ def query_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> Coun
     """
     run, reference = judged.run, judged.reference.config
     unread = unread_options(profile.schema, run)
+    config = {
+        **reference,
+        **{name: one.value for name, one in implied(run, profile.schema, profile.model, reference).items()},
+        **{name: value for name, value in run.config.items() if name not in unread},
+    }
     return CounterfactualQuery(
         profile.model,
-        {
-            **reference,
-            **{name: one.value for name, one in implied(run, profile.schema, profile.model, reference).items()},
-            **{name: value for name, value in run.config.items() if name not in unread},
-        },
+        config,
         {**run.metrics, **run.objectives},
         judged.bounds,
         [{**other.run.metrics, **other.run.objectives} for other in judged.repeats],
         reference=reference,
         variables=profile.schema.variables,
         kept=frozenset(kept),
-        constraints=profile.schema.constraints,
+        constraints=tuple(one for one in profile.schema.constraints if one.options <= config.keys()),
         assumed=frozenset(option.name for option in profile.schema.options) - frozenset(run.config),
     )
 

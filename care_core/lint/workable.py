@@ -23,6 +23,8 @@ OBSTACLES = ("ObstacleLayer", "VoxelLayer")
 INFLATIONS = ("InflationLayer", "LegacyInflationLayer", "AsymmetricInflationLayer")
 SAMPLED = ("DWAPlannerROS", "TrajectoryPlannerROS", "DWBLocalPlanner")
 """Planners that try speeds out, over a time ahead."""
+_SAME_S = 1e-6
+"""Periods that are so near count as one (optimizer.cpp)."""
 _CRITICS = ("CostCritic", "ObstaclesCritic")
 """MPPI's, that may hold a footprint against the costmap."""
 TOP_SPEEDS = ("max_vel_x", "vx_max", "desired_linear_vel", "max_linear_vel", "v_linear_max")
@@ -261,17 +263,22 @@ def _simulated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
 
 
 def _predicted(file: ConfigFile, held: Readers) -> Iterator[Problem]:
-    """Steps of MPPI shorter than a control step, and a footprint that it is told to consider and nobody draws."""
+    """Steps of MPPI shorter than a control step."""
     rate = _rate(held)
-    for reader in held.of("MPPIController"):
+    hz = 0.0 if rate is None or rate.number is None else rate.number
+    for reader in held.of("MPPIController") if rate is not None else ():
         entry = reader.values.get("model_dt")
-        if entry is not None and entry.number and rate is not None and 0 < entry.number * (rate.number or 0) < 0.9999:
+        if rate is not None and entry is not None and entry.number and 0 < entry.number < 1 / hz - _SAME_S:
             text = (
-                f"model_dt ({entry.number:g} s) is shorter than a step of controller_frequency ({rate.number:g} Hz): "
+                f"model_dt ({entry.number:g} s) is shorter than a step of controller_frequency ({hz:g} Hz): "
                 "MPPI does not start."
             )
-            hint = f"Make it {1 / (rate.number or 1):.3g}."
+            hint = f"Make it {math.ceil(1e4 / hz) / 1e4:g}."
             yield _problem("cannot-work", file, entry, text, hint, "optimizer.cpp, setOffset", [rate])
+
+
+def _considered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """A footprint that MPPI is told to consider and nobody draws."""
     local = [one for one in held.of(COSTMAP) if any("local_costmap" in key for key in one.scope)]
     if not local or any(one.has_footprint() for one in local):
         return
@@ -593,6 +600,6 @@ def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
 
 
 RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
-    _simulated, _predicted, _settles, _starts, _progress, _window, _cells, _sizes, _marks, _goal_checks, _unknown_space,
-    _drawn, _smoothed, _vectors, _clocks,
+    _simulated, _predicted, _considered, _settles, _starts, _progress, _window, _cells, _sizes, _marks, _goal_checks,
+    _unknown_space, _drawn, _smoothed, _vectors, _clocks,
 )  # fmt: skip

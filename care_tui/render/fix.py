@@ -15,9 +15,9 @@ from care_tui.basket import possible
 from care_tui.render.odds import promise
 from care_tui.render.rows import Glyphs, Row, Rows, change_text, heading, measure, padded, text, warning
 
-BAR, PERCENT, CHANGE, ODDS = 6, 7, 32, 26
-"""Cells of the bar of the odds alone and of its figure, those behind the name before it, and all that the odds take
-with what they are of."""
+BAR, PERCENT, SHORT, CHANGE, ODDS = 6, 7, 22, 32, 26
+"""Cells of the bar of the odds alone and of its figure, those that a short change and any change take behind the name,
+and all that the odds take with what they are of."""
 
 
 def option_item(  # noqa: PLR0913
@@ -41,8 +41,8 @@ def option_item(  # noqa: PLR0913
         line += Content.styled("  ! reboot", "$text-warning")
     if alone is None:
         return line
-    is_roomy = room >= width + CHANGE + ODDS
-    at = width + CHANGE if is_roomy else room - BAR - PERCENT
+    is_roomy = room >= width + SHORT + ODDS
+    at = min(width + CHANGE, room - ODDS) if is_roomy else room - BAR - PERCENT
     only_this = Content(" if only this" if is_roomy else "")
     return line.pad_right(max(at - line.cell_length, 2)) + promise(alone, glyphs, BAR) + only_this
 

@@ -250,7 +250,8 @@ class CaseScreen(Screen[None]):
     @property
     def _leads_back(self) -> bool:
         """Whether there is anything that Esc takes back."""
-        is_under_way = self.session.state == "loading" or bool(self.query_one(FilterBar).words)
+        # Asked of every key, the first ones before there is a filter.
+        is_under_way = self.session.state == "loading" or any(bar.words for bar in self.query(FilterBar))
         return is_under_way or bool(self._visited) or self._came_from_list
 
     # The filter

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.constraints import parse_constraint
+from care_core.constraints import Constraint, parse_constraint
 from care_core.diagnose.fixes import (
     MAX_CHANGES,
     NEARLY,
@@ -19,6 +19,8 @@ from care_core.diagnose.fixes import (
     smallest_good,
     to_fix,
 )
+from care_core.diagnose.judging import judge
+from care_core.diagnose.judging import query_of as query_of_run
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.variables import Role, Variable
@@ -214,3 +216,10 @@ def test_a_constraint_that_the_run_breaks_itself_forbids_nothing(planted: Profil
     kept = parse_constraint("reserve <= speed", DEFAULTS)
     here = planted_query(planted, reserve=58)
     assert search(replace(here, constraints=(kept,)), ["reserve"]) == search(here, ["reserve"])
+
+
+def test_a_constraint_of_an_option_without_a_value_here_binds_nothing(planted: Profile) -> None:
+    known, unknown = Constraint("reserve >= speed"), Constraint("nowhere <= speed")
+    bound = replace(planted, schema=replace(planted.schema, constraints=(known, unknown)))
+    judged = judge(planted_run(reserve=58), bound.schema, bound.model)
+    assert query_of_run(judged, bound).constraints == (known,)

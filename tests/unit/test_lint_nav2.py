@@ -352,3 +352,11 @@ def test_mppi_considers_a_footprint_where_there_is_one(tmp_path: Path, shape: st
     critics = controller(MPPI, "critics: [CostCritic]", "CostCritic:", "  consider_footprint: true")
     problems = findings(tmp_path, critics + local(shape))
     assert [one.parameter.rpartition("/")[2] for one in problems if one.rule == "cannot-work"] == found
+
+
+@pytest.mark.parametrize("rate", [7.0, 15.0, 20.0, 30.0])
+def test_the_step_that_is_proposed_is_long_enough(tmp_path: Path, rate: float) -> None:
+    lines = [f"controller_frequency: {rate}", "controller_plugins: [FollowPath]", "FollowPath:", f"  plugin: {MPPI}"]
+    (problem,) = findings(tmp_path, node("controller_server", *lines, "  model_dt: 0.01"))
+    proposed = problem.hint.removeprefix("Make it ").rstrip(".")
+    assert findings(tmp_path, node("controller_server", *lines, f"  model_dt: {proposed}")) == ()
