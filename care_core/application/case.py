@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
 from care_core.application.open_run import OpenRun, Reading
@@ -24,12 +25,14 @@ if TYPE_CHECKING:
     from care_core.ecosystems.base import RunModel
     from care_core.ecosystems.findings import Health
     from care_core.ecosystems.ros.drive import Drive
+    from care_core.extract.known import Settings
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
     from care_core.profile.store import Profile
     from care_core.run import ProfileChoice, Robot, Setting
     from care_core.variables import Variable
 
+NOTHING: Settings = MappingProxyType({})
 Progress = Callable[[str, float], None]
 """Is told the step and the share that is done, 0 to 1."""
 
@@ -113,10 +116,12 @@ def open_case(request: Request, progress: Progress) -> Case:
 
     configs = read_configs(request.configs)
     with watching(progress) as progress, opened(request.log, progress) as (log, sha256):
-        profile, choice = choose(log, request.profile)
+        profile, choice = choose(log, request.profile, configs)
         model = _model_of(log, profile, configs)
         progress("looking at what happened", 0.1)
         health = examine(model)
+        if said := model.plugins():  # which tells what neither the log's parameters nor a file may have told
+            profile, choice = choose(log, request.profile, configs, said)
         reading = None
         if profile is not None:
             try:
@@ -139,9 +144,11 @@ def read_case(request: Request, progress: Progress) -> Reading:
 
     configs = read_configs(request.configs)
     with opened(request.log) as (log, sha256):
-        profile, choice = fitting(log, request.profile)
+        profile, choice = fitting(log, request.profile, configs)
         model = _model_of(log, profile, configs)
-        return _read(model, profile, choice, examine(model), request, configs, progress, sha256)
+        health = examine(model)
+        profile, choice = fitting(log, request.profile, configs, model.plugins())
+        return _read(model, profile, choice, health, request, configs, progress, sha256)
 
 
 def _model_of(log: Log, profile: Profile | None, configs: Sequence[ConfigFile]) -> RunModel:
@@ -184,21 +191,33 @@ def opened(path: Path, progress: Progress | None = None) -> Iterator[tuple[Log, 
         yield open_as(format, path), sha256
 
 
-def choose(log: Log, name: str | None = None) -> tuple[Profile | None, ProfileChoice]:
-    """The installed profile that fits a log best, by the names that the log has, None where none fits; or how
-    the one that was named does. Raises CareError."""
+def choose(
+    log: Log, name: str | None = None, configs: Sequence[ConfigFile] = (), said: Settings = NOTHING
+) -> tuple[Profile | None, ProfileChoice]:
+    """The installed profile that fits a log best, by the names that the robot has, None where none fits; or how
+    the one that was named does.
+
+    Args:
+        configs: what the operator says that the robot was configured with; what the log holds is before it.
+        said: parameters that messages of the log tell.
+
+    Raises CareError.
+    """
     from care_core.extract.select import choose_profile
 
-    profiles, left_out = _candidates(log, name)
-    profile, choice = choose_profile(log, profiles)
+    profiles, known, left_out = _candidates(log, name, configs, said)
+    profile, choice = choose_profile(log, profiles, known)
     return profile, replace(_from(choice, profiles), reason=f"{choice.reason}{left_out}")
 
 
-def fitting(log: Log, name: str | None = None) -> tuple[Profile, ProfileChoice]:
+def fitting(
+    log: Log, name: str | None = None, configs: Sequence[ConfigFile] = (), said: Settings = NOTHING
+) -> tuple[Profile, ProfileChoice]:
     """As `choose`, for those who can do nothing without a profile: raises ProfileError where none fits."""
     from care_core.extract.select import fitting_profile
 
-    profile, choice = fitting_profile(log, _candidates(log, name)[0])
+    profiles, known, _ = _candidates(log, name, configs, said)
+    profile, choice = fitting_profile(log, profiles, known)
     return profile, _from(choice, [profile])
 
 
@@ -207,15 +226,20 @@ def _from(choice: ProfileChoice, profiles: Sequence[Profile]) -> ProfileChoice:
     return replace(choice, origin=next((one.origin for one in profiles if one.schema.name == choice.name), ""))
 
 
-def _candidates(log: Log, name: str | None) -> tuple[list[Profile], str]:
-    """Profiles to choose from, by the names that the log has, and what is to be said of those that are not sound."""
+def _candidates(
+    log: Log, name: str | None, configs: Sequence[ConfigFile], said: Settings
+) -> tuple[list[Profile], Settings, str]:
+    """Profiles to choose from, by the names that the robot has, what is known of its parameters, and what is to be said
+    of profiles that are not sound."""
+    from care_core.extract.known import known_settings
     from care_core.extract.parameter_aliases import with_logged_names
     from care_core.extract.select import sound_profiles
     from care_core.profile.store import load_profile
 
     profiles, problems = ([load_profile(name)], ()) if name is not None else sound_profiles(log.format.name)
     left_out = "".join(f"; left out as it is not sound: {problem}" for problem in problems)
-    return [replace(profile, schema=with_logged_names(profile.schema, log)) for profile in profiles], left_out
+    known = known_settings(log, configs, said, [profile.schema for profile in profiles])
+    return [replace(one, schema=with_logged_names(one.schema, log, known)) for one in profiles], known, left_out
 
 
 def _plainly(

@@ -8,7 +8,7 @@ Each is a cause of one noisy-OR (`noisy_or`), with the probability that it is th
 - a part, or what was met: the probability that it really failed, seeing this run's signals, times the probability that
   a mission fails with it;
 - chance: the share of the missions that the reference configuration loses, as counted and as learned;
-- a parameter that the profile does not know.
+- a parameter that the profile does not know, or whose value neither the log nor a file tells.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from care_core.diagnose.estimates import (
     REFUSING,
     SPOKEN_FOR,
     UNMODELLED,
+    UNSAID,
     UNTOLD,
 )
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, Key, NoisyOr, What
@@ -76,6 +77,7 @@ def failure_of(
     findings: Sequence[Finding],
     shown: Mapping[str, Evidence],
     outside: Mapping[str, float] = NONE_OUTSIDE,
+    untold: float = 0.0,
 ) -> NoisyOr:
     """The causes that may have broken these objectives.
 
@@ -84,6 +86,7 @@ def failure_of(
         refused: options that the check reads which refused this mission: they explain it whole.
         shown: by title, the findings that say which options they speak of (`speaking`).
         outside: how likely each parameter outside the profile is wrong and loses a mission in this way.
+        untold: share of the options whose value is not known.
     """
     before = query.before()
     names = [result.variable.name for result in broken]
@@ -100,7 +103,9 @@ def failure_of(
             options[option] = _either(options.get(option, 0.0), share)
     options.update({one.option: REFUSING.value for group in found.values() for one in group if one.option in refused})
     causes: dict[Key, float] = {("parameter", name): q for name, q in {**outside, **options}.items()}
-    return NoisyOr({CHANCE: chance, UNKNOWN: UNMODELLED.value, **with_findings(causes, findings)})
+    return NoisyOr(
+        {CHANCE: chance, UNKNOWN: _either(UNMODELLED.value, UNSAID.value * untold), **with_findings(causes, findings)}
+    )
 
 
 def hypotheses_of(failure: NoisyOr) -> tuple[Hypothesis, ...]:

@@ -25,6 +25,7 @@ SAME_AGAIN = (
     "run the same configuration again: if it fails again, the cause persists (a parameter outside the profile, or the "
     "vehicle); if not, it is what this run met"
 )
+TELL = "triage the log again with '--config FILE', the file that sets the robot's parameters, and record them next time"
 MET = "what this run met"
 """The rival of a cause that stands alone."""
 
@@ -47,7 +48,7 @@ def tell_more(
         again: how a change is tried.
         nothing_else: what is left to be done where nothing of this would help.
     """
-    advice = list(_unrecorded(faults, run))
+    advice = [*([] if run.config else [TELL]), *_unrecorded(faults, run)]
     for fault in faults:
         objective = fault.objective.variable.name
         advice += [

@@ -633,6 +633,8 @@ def _abstains(
     unsafe = needs_unsafe(case.query, max(MIN_PROBABILITY, now + WORTH.value))
     if unsafe is not None:
         return f"only '{unsafe}' past its default is likely to help, and a safety parameter is never made looser"
+    if not case.run.config:
+        return "not one of the parameters that this profile knows is in the log, and no file tells them"
     if not has_cause:
         return (
             "no parameter that this profile models explains the fault: look at what the run met "

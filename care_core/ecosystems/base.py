@@ -83,6 +83,10 @@ class RunModel:
         """One pass over the log."""
         return self.log.read(wanted)
 
+    def plugins(self) -> Mapping[str, tuple[Setting, ...]]:
+        """Parameters that say what the software is put together from, as its messages tell them."""
+        return {}
+
     def repeats(self, channel: str) -> tuple[tuple[float, float], ...]:
         """Spans in which a source only repeats itself while the robot moves: it is frozen, and measures nothing."""
         return ()

@@ -5,13 +5,15 @@ Asked before anything is judged. What the mission and its conditions add is know
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 from care_core.ecosystems.vehicles import UNLIKE_ROVERS, Vehicle, vehicle_of
 from care_core.extract.coverage import Coverage, wrong_kind
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
-from care_core.run import FITS, Fit
+from care_core.run import FITS, Fit, Setting
+
+Settings = Mapping[str, Sequence[Setting]]
 
 MOST = 0.7
 """Share of a profile's options, and of its sources, that a log holds when it fits: some sources stand in for others,
@@ -23,14 +25,16 @@ _SHIM, _BEHIND = "RotationShimController", ".primary_controller"
 _VEHICLES = {"px4": "a PX4 vehicle", "sub": "a submarine", "heli": "a helicopter", "tracker": "an antenna tracker"}
 
 
-def fit_of(log: Log, coverage: Coverage) -> Fit:
-    """How well a profile fits a log, with what is missing or differs."""
+def fit_of(log: Log, coverage: Coverage, known: Settings | None = None) -> Fit:
+    """How well a profile fits a log, with what is missing or differs; `known`: what is known of the robot's parameters,
+    what the log holds unless given."""
     schema = coverage.schema
+    settings = log.settings() if known is None else known
     vehicle = vehicle_of(log.facts, log.settings())
-    obstacles = tuple(_obstacles(log, coverage, vehicle))
+    obstacles = tuple(_obstacles(log, coverage, vehicle, settings))
     if obstacles:
         return Fit("no", obstacles)
-    return FITS.with_objection(*_differences(log, schema, vehicle), *_lacks(coverage))
+    return FITS.with_objection(*_differences(log, schema, vehicle), *_unnamed(schema, settings), *_lacks(coverage))
 
 
 def is_other_vehicle(schema: Schema, vehicle: Vehicle) -> bool:
@@ -38,7 +42,7 @@ def is_other_vehicle(schema: Schema, vehicle: Vehicle) -> bool:
     return bool(schema.match.get("vehicle")) and vehicle.kind not in (schema.match["vehicle"], "unknown")
 
 
-def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle) -> Iterator[str]:
+def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle, settings: Settings) -> Iterator[str]:
     """Why nothing that the profile says of this log could be believed."""
     schema = coverage.schema
     other = wrong_kind(log, schema)
@@ -48,7 +52,7 @@ def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle) -> Iterator[str]:
         yield f"it is for {_a(schema.match['vehicle'])}, this is {_a(vehicle.kind)}"
     elif (airframe := schema.match.get("airframe")) and log.facts.get("vehicle", airframe) != airframe:
         yield f"it is for {_a(airframe)}, this is {_a(log.facts['vehicle'])}"
-    elif other := _other_plugin(log, schema):
+    elif other := _other_plugin(schema, settings):
         yield other
     elif not coverage.found:
         yield "none of its parameters or sources are in the log"
@@ -56,15 +60,21 @@ def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle) -> Iterator[str]:
         yield f"only {coverage.sources} of the {coverage.sources_wanted} messages that it reads are in the log"
 
 
-def _other_plugin(log: Log, schema: Schema) -> str:
-    """Which part of the stack is another than the profile was learned with; '' where the log names none."""
-    settings = log.settings()
+def _other_plugin(schema: Schema, settings: Settings) -> str:
+    """Which part of the stack is another than the profile was learned with; '' where none is known."""
     for name, text in schema.plugins.items():
         for setting in settings.get(name, ()):
             behind = settings.get(name.replace(".plugin", _BEHIND), ()) if _SHIM in str(setting.value) else ()
             if not any(text.casefold() in str(one.value).casefold() for one in (setting, *behind)):
                 return f"{name} is {setting.value}, the profile was learned with {text}"
     return ""
+
+
+def _unnamed(schema: Schema, settings: Settings) -> Iterator[str]:
+    """What nobody says that the robot has, so that it may be another than the profile was learned with."""
+    learned = [text for name, text in schema.plugins.items() if name not in settings]
+    if learned:
+        yield f"nothing says that it drove with {' and '.join(learned)}, as in the profile's runs"
 
 
 def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:

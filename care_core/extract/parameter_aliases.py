@@ -15,15 +15,16 @@ from care_core.variables import Role, Variable
 Settings = Mapping[str, Sequence[Setting]]
 
 
-def with_logged_names(schema: Schema, log: Log) -> Schema:
-    """The schema with each option's parameter as the log names it, and how its unit changed with the name.
+def with_logged_names(schema: Schema, log: Log, known: Settings | None = None) -> Schema:
+    """The schema with each option's parameter as the robot names it, and how its unit changed with the name.
 
-    A log that holds a parameter under none of its names leaves the option as it is.
+    A robot that has a parameter under none of its names leaves the option as it is. `known`: what is known of its
+    parameters, what the log holds unless given.
     """
     if log.format.name not in schema.logs:
         return schema
-    logged = log.settings()
-    kind = schema.match.get("stack") or vehicle_of(log.facts, logged).kind
+    logged = log.settings() if known is None else known
+    kind = schema.match.get("stack") or vehicle_of(log.facts, log.settings()).kind
     if kind in ("unknown", "px4") or all(name in logged for option in schema.options for name in option.parameters):
         return schema
     if kind == "nav2":

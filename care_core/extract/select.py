@@ -7,7 +7,7 @@ from typing import Protocol, TypeVar
 
 from care_core.errors import LogError, ProfileError
 from care_core.extract.coverage import Coverage, cover
-from care_core.extract.fit import fit_of
+from care_core.extract.fit import Settings, fit_of
 from care_core.extract.read import reading_plan
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
@@ -47,17 +47,20 @@ def sound_profiles(format: str = "") -> tuple[list[Profile], list[ProfileError]]
     return sound, problems
 
 
-def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, ProfileChoice]:
+def choose_profile(log: Log, candidates: Sequence[P], known: Settings | None = None) -> tuple[P | None, ProfileChoice]:
     """The candidate that fits best: by its verdict, then by the parameters and sources in the log, then by the robot's
     or firmware's name. One of another stack is none where there is one of the log's own, that does not fit. None where
     none fits, with the reasons; a single candidate is still named then.
+
+    Args:
+        known: what is known of the robot's parameters, what the log holds unless given.
 
     Raises:
         LogError: the log is damaged, and no message of it is left.
     """
     _refuse_unreadable(log)
     covered = [cover(log, candidate.schema) for candidate in candidates]
-    fits = [fit_of(log, coverage) for coverage in covered]
+    fits = [fit_of(log, coverage, known) for coverage in covered]
     order = sorted(range(len(fits)), key=lambda i: (_ORDER[fits[i].verdict], *_nearness(log, covered[i])))
     own = [i for i in order if not _is_of_another_stack(log, covered[i])]
     usable = [i for i in own or order if fits[i].verdict != "no"]
@@ -69,14 +72,14 @@ def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, Profile
     return candidates[best], _choice(covered[best], fits[best], others)
 
 
-def fitting_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice]:
+def fitting_profile(log: Log, candidates: Sequence[P], known: Settings | None = None) -> tuple[P, ProfileChoice]:
     """The candidate that fits best, for those who can do nothing without one.
 
     Raises:
         LogError: as `choose_profile`.
         ProfileError: none fits.
     """
-    profile, choice = choose_profile(log, candidates)
+    profile, choice = choose_profile(log, candidates, known)
     if profile is None:
         named = f"Profile '{choice.name}' does not fit the log" if choice.name else "No profile fits the log"
         hint = "Leave --profile out to have one chosen." if choice.name else "'care inspect' shows what the log holds."

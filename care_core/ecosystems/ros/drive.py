@@ -40,6 +40,7 @@ from care_core.ecosystems.ros.messages import (
 from care_core.ecosystems.ros.motion import Commands, Following, Odometry, commands_of, following, odometry_of
 from care_core.ecosystems.ros.namespaces import is_of, robot_namespaces
 from care_core.ecosystems.ros.node_messages import LogMessage, Report, faults, log_messages, reports
+from care_core.ecosystems.ros.plugin_names import created
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
 from care_core.numbers import Floats, median, quantile
@@ -350,6 +351,9 @@ class Drive(RunModel):
         """What nodes said, in order of time; where it was recorded twice (`/rosout_agg`), once."""
         spoken = [log_messages(table, type) for type in ROSOUT for _, table in self.of(type)]
         return max(spoken, key=len, default=())
+
+    def plugins(self) -> Mapping[str, tuple[Setting, ...]]:
+        return created(self.log_messages)
 
     def log_messages_on(self, topics: Iterable[str]) -> tuple[LogMessage, ...] | None:
         """What nodes said on the first of these topics that the recording has; None where it has none of them."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+from care_core.ecosystems.ros.node_messages import LogMessage
 from care_core.run import Setting
 
 _LISTS = {
@@ -20,6 +21,14 @@ _LAYERS = {"obstacle_layer": _OBSTACLES, "voxel_layer": _OBSTACLES, "inflation_l
 _SOURCE = "scan"
 """Usual name of what a layer gets its obstacles from."""
 _NAME = r"[\w-]+"
+_CREATED = re.compile(
+    rf"Created (controller :|global planner plugin|goal checker :|progress_checker :) ({_NAME}) of type ([\w:/]+)"
+)
+_LIST_OF = {
+    "controller :": "controller_plugins", "global planner plugin": "planner_plugins",
+    "goal checker :": "goal_checker_plugins", "progress_checker :": "progress_checker_plugins",
+}  # fmt: skip
+"""What Nav2's servers (humble to lyrical) call a plugin when they say that they made one, and their list of such."""
 
 Settings = Mapping[str, Sequence[Setting]]
 
@@ -38,6 +47,19 @@ def named_here(name: str, settings: Settings) -> str:
     if usual in _LAYERS and source == _SOURCE:
         tail = f"{_only(_words(settings, f'{node}.{own}.observation_sources'), source)}.{last}"
     return f"{node}.{own}.{tail}"
+
+
+def created(messages: Iterable[LogMessage]) -> dict[str, tuple[Setting, ...]]:
+    """The plugins that servers said they made when they were configured: classes and lists, as parameters tell them."""
+    classes: dict[str, str] = {}
+    lists: dict[str, dict[str, None]] = {}
+    for one in messages:
+        if (said := _CREATED.match(one.text)) is not None:
+            node = f"/{one.node.strip('/').replace('.', '/')}"
+            classes[f"{node}.{said[2]}.plugin"] = said[3]
+            lists.setdefault(f"{node}.{_LIST_OF[said[1]]}", {})[said[2]] = None
+    told = {**classes, **{name: " ".join(names) for name, names in lists.items()}}
+    return {name: (Setting(name, value, "/rosout"),) for name, value in told.items()}
 
 
 def is_named_alike(name: str, other: str) -> bool:

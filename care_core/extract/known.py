@@ -1,0 +1,36 @@
+"""What is known of a robot's parameters before a profile is chosen by them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from care_core.configs.loading import ConfigFile, resolve
+from care_core.ecosystems.ros import ros2_yaml
+from care_core.logs.base import Log
+from care_core.profile.schema import Schema
+from care_core.run import Setting
+
+Settings = Mapping[str, Sequence[Setting]]
+
+
+def known_settings(log: Log, files: Sequence[ConfigFile], said: Settings, schemas: Iterable[Schema]) -> Settings:
+    """What the log holds, before what its messages said, before what files say of the nodes that the profiles name.
+
+    Only where profiles differ by what the robot is put together from: the others are chosen by the log alone.
+    """
+    logged = log.settings()
+    nodes = {_node(name) for schema in schemas for name in (*schema.plugins, *_parameters(schema)) if schema.plugins}
+    if not nodes or not (files or said):
+        return logged
+    of_nodes = [one for one in files if one.format.functions is ros2_yaml]
+    paths = {name.partition(".")[2] for file in of_nodes for name in file.settings}
+    given = resolve(of_nodes, (f"{node}.{path}" for node in nodes for path in paths))
+    return {**{name: (one,) for name, one in given.items()}, **said, **logged}
+
+
+def _parameters(schema: Schema) -> Iterable[str]:
+    return (name for option in schema.options for name in option.parameters)
+
+
+def _node(name: str) -> str:
+    return name.partition(".")[0]
