@@ -111,3 +111,10 @@ def _minutes(time_s: float) -> str:
     hours, minutes = divmod(minutes, 60)
     sign = "-" if time_s < 0 else ""
     return f"{sign}{hours}:{minutes:02}:{rest:02}" if hours else f"{sign}{minutes}:{rest:02}"
+
+
+def percent(share: float) -> str:
+    """A share as a percentage that never claims certainty it has not."""
+    if 0.995 <= share < 1:
+        return ">99%"
+    return "<1%" if 0 < share < 0.005 else f"{share:.0%}"

@@ -13,7 +13,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ranking import LIKELY
 from care_core.records import replace
 from care_core.run import FitVerdict
-from care_core.text import log_time
+from care_core.text import log_time, percent
 from care_core.variables import Change
 
 TOLD_APART = 4.0
@@ -112,7 +112,7 @@ def no_stand_out(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], n
     is_cause = any(one.name in changed and one.probability > chance for one in hypotheses if one.what == "parameter")
     if is_cause and (leader in changed or necessary >= NECESSARY.value):
         return None
-    odds = f"with {_changes(fix)} the odds are {fix.p_fixed:.0%}, as driven {as_driven:.0%}"
+    odds = f"with {_changes(fix)} the odds are {percent(fix.p_fixed)}, as driven {percent(as_driven)}"
     return f"no parameter stands out: {odds}, and nothing in this run says that it was the cause"
 
 
@@ -123,12 +123,12 @@ def explained(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], faul
     weight = next((one.probability for one in hypotheses if leader and one.name == leader), 0.0)
     if leader and leader not in {change.option.name for change in fix.changes}:
         alone = next((c.p_fixed for fault in faults for c in fault.causes if c.option.name == leader), None)
-        does = "no acceptable value of it" if alone is None else f"changing only that has {alone:.0%}"
-        return f"{leader} is the likelier cause ({weight:.0%}), but {does}"
+        does = "no acceptable value of it" if alone is None else f"changing only that has {percent(alone)}"
+        return f"{leader} is the likelier cause ({percent(weight)}), but {does}"
     if leader and fix.p_fixed - as_driven < LITTLE * weight:
         by_chance_alone = as_driven >= fix.p_fixed / 2
         but = "a run as driven may go well by chance" if by_chance_alone else "its change may not be all that it takes"
-        return f"{leader} explains {weight:.0%}, but {but}"
+        return f"{leader} explains {percent(weight)}, but {but}"
     return ""
 
 
@@ -174,7 +174,7 @@ def falls_short(fix: Fix, broken: Sequence[ObjectiveResult], as_driven: float) -
         return None
     reached = "; ".join(filter(None, (_reached(fix, result) for result in broken)))
     limit = f"; with it {reached}" if reached else ""
-    best = f"the best found, {_changes(fix)}, has {fix.p_fixed:.0%}, as driven {as_driven:.0%}"
+    best = f"the best found, {_changes(fix)}, has {percent(fix.p_fixed)}, as driven {percent(as_driven)}"
     return f"no change adds enough to the odds of meeting every limit: {best}{limit}"
 
 

@@ -16,7 +16,7 @@ from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
 from care_core.records import Record
 from care_core.run import FIT_WORDS, Fit, FitVerdict
-from care_core.text import clean, log_time
+from care_core.text import clean, log_time, percent
 
 RunStatus = Status | Literal["unreadable"]
 """What became of a log: the status of its run, or that it could not be read."""
@@ -105,7 +105,7 @@ class Reason(Record):
     is_parameter: bool = False
 
     def __str__(self) -> str:
-        return f"{self.probability:.0%} {self.text}"
+        return f"{percent(self.probability)} {self.text}"
 
 
 class Advice(Record):
@@ -182,7 +182,7 @@ class Verdict(Record):
         """For a line among many: the likeliest reason of a fault, or what could not be judged; empty where all is
         well."""
         if self.status == "fault" and self.reasons and self.reasons[0].name:
-            return f"{self.reasons[0].probability:.0%} {self.reasons[0].name}"
+            return f"{percent(self.reasons[0].probability)} {self.reasons[0].name}"
         if self.status == "fault":
             return f"{self.failed}; no cause stands out"
         return "" if self.status == "ok" and not self.has_but else self.failed
@@ -377,7 +377,7 @@ def fit_text(profile: str, fit: Fit) -> str:
 
 def chance(share: float, is_guess: bool = False) -> str:
     """A probability in words. No line is broken before its warning: an operator may read that line alone."""
-    return f"{share:.0%}{GUESS if is_guess else ' probability'}"
+    return f"{percent(share)}{GUESS if is_guess else ' probability'}"
 
 
 def promise(share: float | None, as_driven: float | None, is_guess: bool = False) -> str:
@@ -389,18 +389,18 @@ def promise(share: float | None, as_driven: float | None, is_guess: bool = False
 
 def beside(as_driven: float | None) -> str:
     """What stands behind every promise: the odds as driven, where they are known."""
-    return "" if as_driven is None else f"; as driven {as_driven:.0%}"
+    return "" if as_driven is None else f"; as driven {percent(as_driven)}"
 
 
 def alone(share: float, as_driven: float | None) -> str:
     """The odds where only one cause is changed, beside those without."""
-    return f"{share:.0%} if only this is changed{beside(as_driven)}"
+    return f"{percent(share)} if only this is changed{beside(as_driven)}"
 
 
 def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = (), outside: Sequence[SeenSuspect] = ()) -> str:
     """An explanation in a clause, with how likely it acted beside those above it where that is another matter."""
     is_both = one.what != "chance" and one.acts - one.probability >= AS_WELL
-    too = f"; {one.acts:.0%} that it acted as well" if is_both else ""
+    too = f"; {percent(one.acts)} that it acted as well" if is_both else ""
     return f"{_explanation(one, findings, outside)}{too}"
 
 

@@ -24,7 +24,7 @@ from care_core.report.document import estimate, parameter_names, plain_number
 from care_core.report.published import Document, publish
 from care_core.run import FitVerdict
 from care_core.tables import parquet
-from care_core.text import clean, listed, wrapped
+from care_core.text import clean, listed, percent, wrapped
 
 SCHEMA_ID: Final = "care.fleet/1"
 NAMED = 8
@@ -425,9 +425,9 @@ def _outlook_lines(one: Suggestion, short: Mapping[str, str], only: Collection[s
 
 def _outlook(one: Outlook, short: Mapping[str, str]) -> str:
     name = _on_one_line(short.get(one.name, run_name(one.name)))
-    odds = "" if one.now is None or one.then is None else f"{one.now:.0%} -> {one.then:.0%}"
+    odds = "" if one.now is None or one.then is None else f"{percent(one.now)} -> {percent(one.then)}"
     if one.effect == "has it":
-        odds = "" if one.now is None else f"{one.now:.0%}"
+        odds = "" if one.now is None else percent(one.now)
     inside = "; ".join(filter(None, (odds, one.why)))
     if not inside:
         return name

@@ -15,7 +15,7 @@ from care_core.report.document import remembered_verdict
 from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import remembered
 from care_core.run import FitVerdict, Robot
-from care_core.text import clean, wrapped
+from care_core.text import clean, percent, wrapped
 
 SCHEMA_ID: Final = "care.history/1"
 _SPARKS = 24
@@ -205,7 +205,7 @@ def _lines(document: HistoryDocument, ascii: bool, everything: bool) -> Iterator
         yield "No triage is remembered yet."
     for past in document.triages:
         when = past.at[:16].replace("T", " ")
-        odds = "odds not measured" if past.p_fixed is None else f"{past.p_fixed:.0%}{beside(past.odds_as_driven)}"
+        odds = "odds not measured" if past.p_fixed is None else f"{percent(past.p_fixed)}{beside(past.odds_as_driven)}"
         fix = f"  change {', '.join(past.options)} ({odds})" if past.options else ""
         fit = fit_words(past.profile, past.fit).removeprefix("Profile ")
         yield from wrapped(f"{when}  {Path(past.log).name}  {fit}  {past.verdict}{fix}", rest=" " * (len(when) + 2))

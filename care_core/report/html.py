@@ -21,7 +21,7 @@ from care_core.report.plots import NOTHING_DRAWN, Drawing, Plot, plot_figure
 from care_core.report.shared_causes import together
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.run import shown
-from care_core.text import clean, listed, log_time
+from care_core.text import clean, listed, log_time, percent
 
 _SIGNS = {"ok": "✓", "fault": "✗", "not_evaluated": "?"}
 _CODE = Markup("<code>{}</code>")
@@ -78,7 +78,7 @@ def _pages() -> Environment:
         "clean": clean,
         "figure": _figure,
         "log_time": log_time,
-        "share": "{:.0%}".format,
+        "share": percent,
         "shown": shown,
     }
     return pages

@@ -34,7 +34,7 @@ from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import profile_of
 from care_core.report.suggested import BY_HAND, BY_REPORTS, fix_sets, suggested_changes
 from care_core.run import Run
-from care_core.text import clean, wrapped
+from care_core.text import clean, percent, wrapped
 from care_core.variables import Threshold
 
 SCHEMA_ID: Final = "care.verify/1"
@@ -231,7 +231,7 @@ def _lines(document: VerifyDocument) -> Iterator[str]:
     yield ""
     which = f" of alternative {document.alternative}" if document.alternative else ""
     odds = document.p_fixed
-    promised = "odds not measured" if odds is None else f"promised at {odds:.0%}{beside(document.odds_as_driven)}"
+    promised = "odds not measured" if odds is None else f"promised at {percent(odds)}{beside(document.odds_as_driven)}"
     yield f"Changes{which} ({promised})"
     for change in document.changes:
         driven = "" if change.driven is None or change.made == "made" else f" ({change.driven:g} was driven)"

@@ -21,7 +21,7 @@ from care_core.report.document import (
 )
 from care_core.report.published import Document, publish, publishable
 from care_core.run import Fit
-from care_core.text import clean, listed, wrapped
+from care_core.text import clean, listed, percent, wrapped
 
 SCHEMA_ID: Final = "care.whatif/1"
 
@@ -125,7 +125,7 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
     yield ""
     yield from wrapped(
         f"{chance(answer.p_ok, answer.is_guess)} that all objectives are met with the change, "
-        f"{answer.p_ok_now:.0%} without it"
+        f"{percent(answer.p_ok_now)} without it"
         + (f", unless it happens again: {clean(listed(question.lost_by))}" if question.lost_by else "")
     )
 
@@ -134,7 +134,7 @@ def _outlook(outlook: Outlook, is_guess: bool) -> str:
     result, predicted = outlook.objective, outlook.predicted
     unit = result.variable.unit
     probability = "" if predicted.p_ok is None else chance(predicted.p_ok, is_guess)
-    unchanged = "" if outlook.now.p_ok is None else f" ({outlook.now.p_ok:.0%} without the change)"
+    unchanged = "" if outlook.now.p_ok is None else f" ({percent(outlook.now.p_ok)} without the change)"
     if result.variable.kind == "functional":
         went = {"fault": "failed; would succeed", "ok": "succeeded; would again", "not_evaluated": "would succeed"}
         return f"{went[result.status]} with {probability}{unchanged}"

@@ -18,6 +18,7 @@ from textual.strip import Strip
 from textual.style import Style
 from textual.visual import RenderOptions, Visual
 
+from care_core import text as words
 from care_core.diagnose.records import (
     Status,
 )
@@ -196,10 +197,8 @@ def warning(label: str, value: str) -> Row:
 
 
 def percent(share: float) -> str:
-    """A share as a percentage that never claims certainty it has not."""
-    if 0.995 <= share < 1:
-        return ">99 %"
-    return "<1 %" if 0 < share < 0.005 else f"{share:.0%}".replace("%", " %")
+    """A share as reports have it, with a space for the screen."""
+    return words.percent(share).replace("%", " %")
 
 
 def measure(value: float | None, unit: str) -> str:

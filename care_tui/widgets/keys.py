@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from textual.binding import Binding
 from textual.content import Content
 from textual.screen import Screen
 from textual.style import Style
 from textual.widgets import Static
 
 from care_tui.render.rows import Glyphs, cut, joined
+
+_BACK, _ALWAYS = "page.back", ("app.help", "app.quit")
+"""Bindings by their names: the first to go, and those that stay, where the line is short."""
 
 
 class Keys(Static):
@@ -27,13 +31,22 @@ class Keys(Static):
         shown = {
             one.binding.action: one.binding for one in reversed(screen.active_bindings.values()) if one.binding.show
         }
-        keys = [
-            Content.assemble(
-                (self.app.get_key_display(binding), "bold $footer-key-foreground"), f" {binding.description}"
-            ).stylize(Style.from_meta({"@click": f"app.simulate_key('{binding.key}')"}))
-            for binding in reversed(shown.values())
-        ]
-        content = cut(joined(keys, "  "), self.size.width or self.app.size.width, self._glyphs)
+        content = self._fitting(list(reversed(shown.values())))
         if not self._keys.is_same(content):
             self._keys = content
             self.update(content, layout=False)
+
+    def _fitting(self, bindings: list[Binding]) -> Content:
+        """The keys that the line has room for: help stays, which lists them all, and the way back is known best."""
+        width = self.size.width or self.app.size.width
+        own = [one for one in bindings if one.id not in _ALWAYS]
+        always = [one for one in bindings if one.id in _ALWAYS]
+        own.sort(key=lambda one: one.id == _BACK)
+        while own and joined([self._key(one) for one in (*own, *always)], "  ").cell_length > width:
+            own.pop()
+        return cut(joined([self._key(one) for one in (*own, *always)], "  "), width, self._glyphs)
+
+    def _key(self, binding: Binding) -> Content:
+        return Content.assemble(
+            (self.app.get_key_display(binding), "bold $footer-key-foreground"), f" {binding.description}"
+        ).stylize(Style.from_meta({"@click": f"app.simulate_key('{binding.key}')"}))
