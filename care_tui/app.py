@@ -29,6 +29,7 @@ from care_tui.engine import Engine
 from care_tui.hangup import on_hangup
 from care_tui.link import Link, linked
 from care_tui.page_names import LOGS, STEPS, VIEWS
+from care_tui.pages.page import OPEN
 from care_tui.places import as_path, is_openable
 from care_tui.render.rows import ASCII, UNICODE
 from care_tui.screens.case import CaseScreen
@@ -239,15 +240,19 @@ class CareApp(App[int], inherit_bindings=False):
         return (binding.key_display or binding.key) if is_named else super().get_key_display(binding)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """What the command palette offers: the pages by the names of their tabs, and every action of the page."""
+        """What the command palette offers, each with its keys: the pages by the names of their tabs, and what the page
+        does; but for Enter, which leads to one of the pages."""
         if isinstance(screen, CaseScreen):
+            keys = {id: shown for shown, _, id in self._keys_of(screen)}
             for page in (*STEPS, *VIEWS, LOGS):
-                yield SystemCommand(page.title, page.about, partial(screen.run_action, f"screen.go('{page.name}')"))
-            for active in screen.active_bindings.values():
-                binding = active.binding
-                if active.node is screen.page and active.enabled:
+                about = f"{page.about} ({keys.get(page.binding, page.key)})"
+                yield SystemCommand(page.title, about, partial(screen.run_action, f"screen.go('{page.name}')"))
+            own = {one.binding.id: one.binding for one in screen.active_bindings.values() if one.node is screen.page}
+            for id, binding in own.items():
+                if id in keys and id != OPEN:
                     action = binding.action.partition("(")[0]
-                    about = (getattr(screen.page, f"action_{action}").__doc__ or "").strip()
+                    about = (getattr(screen.page, f"action_{action}").__doc__ or "").strip().rstrip(".")
+                    about = f"{about} ({keys[id]})"
                     yield SystemCommand(binding.description, about, partial(screen.page.run_action, binding.action))
         yield SystemCommand("Help", "The keys that work here", self.action_help)
         yield SystemCommand("Theme", "Change the colours", self.action_change_theme)

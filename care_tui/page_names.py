@@ -33,6 +33,11 @@ class PageInfo(Record):
         return self.keys.rsplit(",", 1)[-1]
 
     @property
+    def binding(self) -> str:
+        """What settings call the binding of its keys."""
+        return f"{'step' if self in STEPS else 'view'}.{self.name}"
+
+    @property
     def short(self) -> str:
         """The title where the terminal is too narrow for all of them."""
         return _SHORT.get(self.name, self.title)

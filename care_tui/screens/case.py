@@ -28,7 +28,7 @@ from care_core.records import Record, replace
 from care_core.text import clean
 from care_tui.engine import CAUSES, CancelledError, as_care_error
 from care_tui.messages import Answered, Decided, Go, Judge, OpenLog, Progressed
-from care_tui.page_names import NAMES, PAGES, STEPS, VIEWS
+from care_tui.page_names import LOGS, NAMES, PAGES, STEPS, VIEWS
 from care_tui.pages.logs import LogsPage
 from care_tui.pages.making import make_page
 from care_tui.pages.page import Page
@@ -74,9 +74,10 @@ class CaseScreen(Screen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "back", "Back", key_display="esc", id="page.back"),
         Binding("slash", "filter", "Filter", show=False, key_display="/", id="page.filter"),
-        *(Binding(page.keys, f"go('{page.name}')", page.title, show=False, id=f"step.{page.name}") for page in STEPS),
-        *(Binding(page.keys, f"go('{page.name}')", page.title, show=False, id=f"view.{page.name}") for page in VIEWS),
-        Binding("L", "go('logs')", "Logs", show=False, id="view.logs"),
+        *(
+            Binding(page.keys, f"go('{page.name}')", page.title, show=False, id=page.binding)
+            for page in (*STEPS, *VIEWS, LOGS)
+        ),
         Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
         Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
         Binding("tab", "app.focus_next", "Next pane", show=False, id="screen.next-pane"),

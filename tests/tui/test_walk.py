@@ -537,8 +537,12 @@ async def test_the_palette_offers_steps_and_actions(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4")
-        names = {command.title for command in app.get_system_commands(app.screen)}
-    assert {"Log", "Report", "Map", "Messages", "Alternative", "Undo", "Value", "Theme", "Help", "Quit"} <= names
+        offered = [(command.title, command.help) for command in app.get_system_commands(app.screen)]
+    about = dict(offered)
+    assert {"Log", "Report", "Map", "Messages", "Alternative", "Undo", "Value", "Theme", "Help", "Quit"} <= about.keys()
+    assert len(offered) == len(about)
+    assert about["Report"].endswith("(6)")
+    assert about["Alternative"].endswith("(a)")
 
 
 async def test_without_colours_and_in_ascii_nothing_is_lost(make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:
