@@ -45,6 +45,7 @@ class _Campaign(BaseModel):
     sampling: Method = "sobol"
     at_reference: float = Field(default=0.5, ge=0, le=0.95)
     repeats: float = Field(default=0.1, ge=0, le=0.5)
+    reference: float = Field(default=0.0, ge=0, le=0.5)
     options: list[str] | dict[str, tuple[float, float] | None] | None = None
     limits: list[str] = Field(default_factory=list)
     slots: int = Field(default=1, ge=1, le=256)
@@ -85,6 +86,7 @@ class Campaign(Record, eq=False):
     sampling: Method
     at_reference: float
     repeats: float
+    reference: float
     slots: int
     time_limit_s: float
     retries: int
@@ -131,6 +133,7 @@ def read_campaign(path: Path) -> Campaign:
         sampling=data.sampling,
         at_reference=data.at_reference,
         repeats=data.repeats,
+        reference=data.reference,
         slots=data.slots,
         time_limit_s=data.time_limit_s,
         retries=data.retries,
@@ -327,6 +330,7 @@ def _digest(data: _Campaign, space: Space, schema: Schema) -> str:
         (data.runs, data.seed, data.sampling, data.at_reference, data.repeats, data.batch, data.tell_apart),
         schema.digest,
         repr(sorted(schema.mission.items())),
+        *([data.reference] if data.reference else ()),
     )
     return hashlib.sha256(repr(plan).encode()).hexdigest()
 

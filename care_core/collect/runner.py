@@ -19,7 +19,17 @@ from care_core.collect.campaign import Campaign, parameter_file_names
 from care_core.collect.journal import Done, Journal
 from care_core.collect.leftovers import end_leftovers
 from care_core.collect.mission import GRACE_S, RUNS, fly
-from care_core.collect.sampling import Planned, one_at_a_time, points, repeat_of, repeats_among, run_seed, with_repeats
+from care_core.collect.sampling import (
+    Planned,
+    at_reference,
+    kind_of,
+    new_among,
+    one_at_a_time,
+    points,
+    repeat_of,
+    run_seed,
+    with_repeats,
+)
 from care_core.configs.driven import parameter_value, readable
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import CareError, UsageError
@@ -87,13 +97,13 @@ def first_round(campaign: Campaign) -> list[Planned]:
     space, count = campaign.space, campaign.runs
     if campaign.sampling == "adaptive":
         count = min(count, max(_FIRST_ROUND * len(space.axes), campaign.batch) + 1)
-    wanted = count - 1 - repeats_among(count, campaign.repeats)
+    wanted = new_among(count, campaign.repeats, campaign.reference)
     if campaign.sampling == "one_at_a_time":
         configs = one_at_a_time(space, wanted)
     else:
         method = "sobol" if campaign.sampling == "adaptive" else campaign.sampling
         configs = points(space, method, wanted, campaign.at_reference, campaign.seed)
-    return with_repeats(space, configs, count, campaign.repeats, campaign.seed)
+    return with_repeats(space, configs, count, campaign.repeats, campaign.seed, campaign.reference)
 
 
 def collect(campaign: Campaign, folder: Path, *, retry_failed: bool = False, progress: Report) -> Collected:
@@ -160,25 +170,29 @@ def _next_round(found: Collected) -> list[Planned]:
     """What an adaptive campaign runs next, repeats among it."""
     campaign, before = found.campaign, len(found.planned)
     numbers = range(before + 1, min(before + campaign.batch, campaign.runs) + 1)
-    repeats = [n for n in numbers if int(n * campaign.repeats) > int((n - 1) * campaign.repeats)]
+    kinds = {number: kind_of(number, campaign.repeats, campaign.reference) for number in numbers}
     configs = iter(
         choose(
             campaign.space,
             _known(found),
-            len(numbers) - len(repeats),
+            sum(kind == "new" for kind in kinds.values()),
             at_reference=campaign.at_reference,
             seed=run_seed(campaign.seed, before),
             apart=campaign.tell_apart,
         )
     )
     repeated = {run.repeats for run in found.planned.values()} - {None}
+    again = sum(kind_of(number, campaign.repeats, campaign.reference) == "repeat" for number in range(1, before + 1))
     originals = (n for n, run in sorted(found.planned.items()) if run.repeats is None and n not in repeated)
     planned = []
     for number in numbers:
-        original = next(originals, None) if number in repeats else None
+        if kinds[number] == "reference":
+            planned.append(at_reference(campaign.space, number, campaign.seed))
+            continue
+        original = next(originals, None) if kinds[number] == "repeat" else None
         if original is not None:
-            planned.append(repeat_of(found.planned[original], number, campaign.seed, before=len(repeated)))
-            repeated.add(original)
+            planned.append(repeat_of(found.planned[original], number, campaign.seed, before=again))
+            again += 1
         elif (config := next(configs, None)) is not None:
             planned.append(Planned(number, config, run_seed(campaign.seed, number)))
     return planned

@@ -99,35 +99,62 @@ def _finer() -> Iterator[float]:
         parts *= 2
 
 
-def with_repeats(space: Space, configs: Sequence[Config], count: int, share: float, seed: int) -> list[Planned]:
+Kind = Literal["new", "repeat", "reference"]
+
+
+def kind_of(number: int, repeats: float, reference: float) -> Kind:
+    """What a run of a campaign is: a new configuration, a repeat of an earlier run, or the reference once more.
+
+    Both are spread over the campaign: one that is cut short has its share of them too.
+    """
+    if number == 1:
+        return "new"
+    if _falls(number, repeats):
+        return "repeat"
+    return "reference" if _falls(number - int(number * repeats), reference / (1.0 - repeats)) else "new"
+
+
+def _falls(number: int, share: float) -> bool:
+    return int(number * share) > int((number - 1) * share)
+
+
+def with_repeats(
+    space: Space, configs: Sequence[Config], count: int, share: float, seed: int, reference: float = 0.0
+) -> list[Planned]:
     """The plan: the reference first, then the configurations, with repeats of earlier runs in between.
 
     Args:
         count: runs in all.
         share: share of them that repeat an earlier one: the reference first, then the others from the beginning.
             Every other one of them meets the conditions of the run that it repeats once more.
+        reference: share of them that drive the reference, each under conditions of its own.
     """
     planned: list[Planned] = []
     repeats = 0
     fresh, originals = iter((space.reference, *configs)), iter(range(1, count + 1))
     for number in range(1, count + 1):
-        # Spread over the campaign: one that is cut short has its share of them too.
-        is_repeat = number > 1 and int(number * share) > int((number - 1) * share)
-        if is_repeat:
+        kind = kind_of(number, share, reference)
+        if kind == "repeat":
             original = next(n for n in originals if planned[n - 1].repeats is None)
             planned.append(repeat_of(planned[original - 1], number, seed, before=repeats))
             repeats += 1
-            continue
-        config = next(fresh, None)
-        if config is None:
+        elif kind == "reference":
+            planned.append(at_reference(space, number, seed))
+        elif (config := next(fresh, None)) is not None:
+            planned.append(Planned(number, config, run_seed(seed, number)))
+        else:
             break
-        planned.append(Planned(number, config, run_seed(seed, number)))
     return planned
 
 
-def repeats_among(count: int, share: float) -> int:
-    """How many runs of so many `with_repeats` makes repeats."""
-    return sum(int(n * share) > int((n - 1) * share) for n in range(2, count + 1))
+def new_among(count: int, share: float, reference: float = 0.0) -> int:
+    """How many new configurations `with_repeats` takes for so many runs, the reference of the first not counted."""
+    return sum(kind_of(number, share, reference) == "new" for number in range(2, count + 1))
+
+
+def at_reference(space: Space, number: int, seed: int) -> Planned:
+    """The reference, which the first run drives, under conditions of its own."""
+    return Planned(number, space.reference, run_seed(seed, number), 1)
 
 
 def repeat_of(run: Planned, number: int, seed: int, *, before: int) -> Planned:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.collect.sampling import Method, one_at_a_time, points, repeats_among, with_repeats
+from care_core.collect.sampling import Method, new_among, one_at_a_time, points, with_repeats
 from care_core.collect.space import Axis, Space
 from care_core.constraints import parse_constraint
 from care_core.errors import UsageError
@@ -122,7 +122,7 @@ def test_one_at_a_time_changes_one_option_and_begins_with_the_ends() -> None:
 
 def test_repeats_are_spread_and_the_reference_comes_first() -> None:
     where = space(TWO)
-    configs = points(where, "sobol", 20 - 1 - repeats_among(20, 0.2), 0.0, 1)
+    configs = points(where, "sobol", new_among(20, 0.2), 0.0, 1)
     plan = with_repeats(where, configs, 20, 0.2, 3)
     assert [run.number for run in plan] == list(range(1, 21))
     assert plan[0].config == where.reference
@@ -130,6 +130,16 @@ def test_repeats_are_spread_and_the_reference_comes_first() -> None:
     assert all(run.config == plan[run.repeats - 1].config for run in plan if run.repeats)
     again = {run.number: run.repeats for run in plan if run.repeats and run.seed == plan[run.repeats - 1].seed}
     assert again == {10: 2, 20: 4}  # every other one meets the conditions of the run that it repeats
+    assert len({run.seed for run in plan}) == 18
+
+
+def test_the_reference_is_driven_again_under_conditions_of_its_own() -> None:
+    where = space(TWO)
+    configs = points(where, "sobol", new_among(20, 0.2, 0.1), 0.0, 1)
+    plan = with_repeats(where, configs, 20, 0.2, 3, 0.1)
+    assert len(plan) == 20
+    assert {run.number: run.repeats for run in plan if run.repeats} == {5: 1, 9: 1, 10: 2, 15: 3, 19: 1, 20: 4}
+    assert all(plan[n - 1].config == where.reference for n in (1, 5, 9, 19))
     assert len({run.seed for run in plan}) == 18
 
 
