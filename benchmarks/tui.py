@@ -4,7 +4,7 @@
 
 Prints: first usable frame (warm), key to repaint with 600 options and 200 paths loaded, bytes for one cursor move and
 for a change of step, frames drawn while idle. All but the first use a diagnosis made here, so that the engine's time is
-not in them.
+not in them. Beside it, on the same terminal in the same run, those of the apps in `PEERS` that are installed.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import argparse
 import os
 import pty
 import select
+import shutil
 import statistics
 import struct
 import subprocess
@@ -32,6 +33,12 @@ from care_core.variables import Change, Role, Threshold, Variable
 OPTIONS, PATHS = 600, 200
 QUIET_S = 0.12
 """Nothing written for so long: the repaint is over."""
+PEERS = {
+    "harlequin": (("harlequin",), b"Query Editor", b"\t"),
+    "posting": (("posting",), b"Collection", b"\t"),
+    "btop": (("btop", "--utf-force"), b"mem", b"\x1b[B"),
+}
+"""Apps of the terminal: the command, what its first frame holds, and a key that moves the cursor or the focus."""
 ROOT = Path(__file__).parent.parent
 SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
 
@@ -146,20 +153,47 @@ class Terminal(Struct, eq=False):
     def stop(self) -> None:
         os.write(self.fd, b"q")
         self.read(timeout=2.0)
-        self.process.wait(10)
+        try:
+            self.process.wait(5)
+        except subprocess.TimeoutExpired:  # a peer leaves by another key
+            self.process.kill()
+            self.process.wait(10)
         os.close(self.fd)
 
 
-def first_frame(log: Path) -> tuple[float, float]:
-    """Seconds from the start of the process to a step bar that answers keys, and seconds of processor it took."""
-    command = [sys.executable, "-c", "from care_tui.start import main; main()", str(log)]
+def ours(log: Path) -> list[str]:
+    """The command of a new process of this app."""
+    return [sys.executable, "-c", "from care_tui.start import main; main()", str(log)]
+
+
+def first_frame(command: Sequence[str], marker: bytes = b"Objectives") -> tuple[float, float]:
+    """Seconds from the start of the process to a frame that holds the marker, of ours to a step bar that answers keys,
+    and seconds of processor it took."""
     terminal = Terminal.start(command, 80, 24)
     seen = b""
-    while b"Objectives" not in seen:
+    while marker not in seen:
         seen += os.read(terminal.fd, 65536)
     elapsed, cpu = time.perf_counter() - terminal.started, terminal.cpu_s()
     terminal.stop()
     return elapsed, cpu
+
+
+def _beside(name: str, frame_s: float, runs: int) -> None:
+    """A peer's first frame, as a ratio to ours, what it writes for a key, and what while nothing happens."""
+    command, marker, key = PEERS[name]
+    frame = statistics.median(first_frame(command, marker)[0] for _ in range(runs))
+    terminal = Terminal.start(command, 80, 24)
+    terminal.read(until=marker)
+    time.sleep(2)
+    terminal.read(timeout=2.0)
+    written = statistics.median(terminal.key(key)[0] for _ in range(10))
+    idle = 0
+    for _ in range(3):
+        time.sleep(1)
+        idle += len(terminal.read(timeout=0.5)[0])
+    terminal.stop()
+    print(f"{name}, 80 x 24: first frame {frame:.2f} s ({frame / frame_s:.1f} x ours)")
+    print(f"  {written:.0f} bytes for a key, {idle} while idle for 3 s")
 
 
 def main() -> None:
@@ -168,8 +202,8 @@ def main() -> None:
     parser.add_argument("--log", type=Path, default=SAMPLE)
     parser.add_argument("--runs", type=int, default=5)
     arguments = parser.parse_args()
-    first_frame(arguments.log)
-    frames = sorted(first_frame(arguments.log) for _ in range(arguments.runs))
+    first_frame(ours(arguments.log))
+    frames = sorted(first_frame(ours(arguments.log)) for _ in range(arguments.runs))
     middle, cpu = statistics.median(frame[0] for frame in frames), frames[0][1]
     print(f"load of the machine {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     print(
@@ -178,6 +212,8 @@ def main() -> None:
     )
     for width, height in ((80, 24), (120, 40)):
         _measure_keys(width, height)
+    for name in filter(shutil.which, PEERS):
+        _beside(name, middle, arguments.runs)
 
 
 def _measure_keys(width: int, height: int) -> None:

@@ -34,7 +34,7 @@ def fit_of(log: Log, coverage: Coverage, known: Settings | None = None) -> Fit:
     obstacles = tuple(_obstacles(log, coverage, vehicle, settings))
     if obstacles:
         return Fit("no", obstacles)
-    return FITS.with_objection(*_differences(log, schema, vehicle), *_unnamed(schema, settings), *_lacks(coverage))
+    return FITS.with_objection(*_differences(log, schema, vehicle), *_lacks(coverage), *_unnamed(schema, settings))
 
 
 def is_other_vehicle(schema: Schema, vehicle: Vehicle) -> bool:
@@ -72,7 +72,12 @@ def _other_plugin(schema: Schema, settings: Settings) -> str:
 
 def _unnamed(schema: Schema, settings: Settings) -> Iterator[str]:
     """What nobody says that the robot has, so that it may be another than the profile was learned with."""
-    learned = [text for name, text in schema.plugins.items() if name not in settings]
+    told = {key.casefold() for key in settings}
+    learned = [
+        text
+        for name, text in schema.plugins.items()
+        if name not in settings and not any(text.casefold() in key for key in told)
+    ]
     if learned:
         yield f"nothing says that it drove with {' and '.join(learned)}, as in the profile's runs"
 

@@ -19,12 +19,13 @@ def known_settings(log: Log, files: Sequence[ConfigFile], said: Settings, schema
     Only where profiles differ by what the robot is put together from: the others are chosen by the log alone.
     """
     logged = log.settings()
-    nodes = {_node(name) for schema in schemas for name in (*schema.plugins, *_parameters(schema)) if schema.plugins}
-    if not nodes or not (files or said):
+    differing = [schema for schema in schemas if schema.plugins]
+    if not differing or not (files or said):
         return logged
-    of_nodes = [one for one in files if one.format.functions is ros2_yaml]
-    paths = {name.partition(".")[2] for file in of_nodes for name in file.settings}
-    given = resolve(of_nodes, (f"{node}.{path}" for node in nodes for path in paths))
+    names = {name for schema in differing for name in schema.plugins}
+    nodes = {name.partition(".")[0] for schema in differing for name in (*schema.plugins, *_parameters(schema))}
+    paths = {name.partition(".")[2] for file in files if _names_nodes(file) for name in file.settings}
+    given = resolve(files, {*names, *(f"{node}.{path}" for node in nodes for path in paths)})
     return {**{name: (one,) for name, one in given.items()}, **said, **logged}
 
 
@@ -32,5 +33,5 @@ def _parameters(schema: Schema) -> Iterable[str]:
     return (name for option in schema.options for name in option.parameters)
 
 
-def _node(name: str) -> str:
-    return name.partition(".")[0]
+def _names_nodes(file: ConfigFile) -> bool:
+    return file.format.functions is ros2_yaml

@@ -10,9 +10,11 @@ import pytest
 from care_core.extract.coverage import cover, try_on
 from care_core.extract.fit import fit_of
 from care_core.extract.select import choose_profile
+from care_core.files import bundled
 from care_core.logs.opening import open_log
 from care_core.profile.store import load_profile
 from care_core.records import replace
+from care_core.run import Setting
 from tests.courier import TOLERANCE, USUAL, deliver
 
 PLUGIN = "/controller_server.FollowPath.plugin"
@@ -42,6 +44,23 @@ def test_a_profile_of_another_stack_does_not_stand_in_for_one_whose_controller_i
     assert choose_profile(log, [husky, other])[0] is None
     (reason,) = choose_profile(log, [husky, other])[1].fit.reasons
     assert reason.endswith("the profile was learned with MPPI")
+
+
+TEB, DWA = "teb_local_planner/TebLocalPlannerROS", "dwa_local_planner/DWAPlannerROS"
+
+
+@pytest.mark.parametrize(("planner", "fits"), [(TEB, False), (DWA, True)])
+@pytest.mark.parametrize("name", ["move_base", "husky", "husky-care", "turtlebot3"])
+def test_a_robot_with_another_local_planner_is_none_of_move_base(name: str, planner: str, fits: bool) -> None:
+    log, schema, named = (
+        open_log(bundled("samples", "move_base_drive.bag")),
+        load_profile(name).schema,
+        "base_local_planner",
+    )
+    known = {**log.settings(), f"/move_base/{named}": (Setting(f"/move_base/{named}", planner, "a file"),)}
+    fit = fit_of(log, cover(log, schema), known)
+    assert (fit.verdict != "no") is fits
+    assert not any("nothing says" in reason for reason in fit.reasons)
 
 
 def test_what_ros_2_misses_is_recorded_on_the_topic_of_all_nodes(log_path: Path) -> None:
