@@ -24,12 +24,23 @@ STACKS: Mapping[Ros, str] = {
     "ros1": "the sources of ros-planning/navigation and teb_local_planner, indigo to noetic",
     "ros2": "the sources of ros-navigation/navigation2, foxy to rolling",
 }
+MENDED: Mapping[str, FactType] = {
+    "default_server_timeout": "int", "expected_update_rate": "float", "transform_tolerance": "float",
+    "use_sim_time": "bool",
+}  # fmt: skip
+"""Parameters whose right value a recording shows, by the last part of their names, with their types: a finding may ask
+for a change of them, and a report may make it, whatever profile is theirs."""
 EVERY_NODE = "*"
 _GENERAL = re.compile(r"(use_sim_time|qos_overrides|bond_|diagnostic_updater|start_type_description)")
 _LOADING = frozenset({"plugin", "class"})
 """What names the class of a part that is loaded."""
 _WORD = re.compile(r"[a-z]+")
 _COMMON = frozenset({"server", "plugin", "parameters", "layer", "ros", "base"})
+
+
+def mended(name: str) -> FactType:
+    """The type of a parameter that a recording can show the right value of; "" for any other."""
+    return MENDED.get(re.split(r"[/.]", name)[-1], "")
 
 
 def is_ros(stack: str) -> TypeGuard[Ros]:

@@ -16,6 +16,7 @@ from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import ConfigError, nearest
 from care_core.metadata.ardupilot import known_in
 from care_core.metadata.causal_map import Role, meaning_of
+from care_core.metadata.navigation import mended
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, installed_profile
 from care_core.records import Record, replace
@@ -126,8 +127,11 @@ def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str, roles:
 
 
 def _outside(name: str, schema: Schema, roles: frozenset[Role]) -> Variable | None:
-    """A parameter that no option of the profile sets, where the firmware documents it and it has one of these roles."""
+    """A parameter that no option of the profile sets, where the firmware documents it and it has one of these roles, or
+    where a recording of a ROS robot shows its value."""
     vehicle = Vehicle(_KINDS_BY_WORD.get(schema.match.get("vehicle", ""), "unknown"), "", "", None)
+    if schema.match.get("stack") and mended(name) and is_parameter_name(name) and roles >= BY_REPORTS:
+        return outside_option(name, None, vehicle)
     meaning = meaning_of(name, vehicle.kind) if is_parameter_name(name) else None
     if meaning is None or meaning.role not in roles or not known_in(name):
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast, get_args
 
 from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect
 from care_core.ecosystems.findings import Finding, every_finding
@@ -12,6 +13,7 @@ from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import Role as ParameterRole
 from care_core.metadata.causal_map import meaning_of
 from care_core.metadata.fact import Fact
+from care_core.metadata.navigation import mended
 from care_core.records import Record, replace
 from care_core.run import Run, shown
 from care_core.variables import Change, Role, ValueType, Variable
@@ -52,16 +54,19 @@ def leading_outside(
     if first is None or first.what != "parameter" or first.name in run.config:
         return None
     setting, meaning = run.settings.get(first.name), meaning_of(first.name, vehicle_of_run(run).kind)
-    if meaning is None or setting is None or not isinstance(setting.value, (int, float)):
+    if setting is None or not isinstance(setting.value, (int, float)):
         return None
     suspect = next((one for one in suspects if one.name == first.name), None)
     finding = next((one for one in every_finding(findings) if first.name in one.parameters), None)
+    if meaning is None and finding is None:  # nothing but a finding knows the parameters of a ROS robot
+        return None
     measured = None if finding is None else dict(finding.wanted).get(first.name)
     wanted = suspect.back if measured is None and suspect is not None else measured
     if finding is None and suspect is None:
         return None
-    is_learned = suspect is not None and suspect.is_learned and meaning.role in LEARNED
-    is_carried = (measured is not None or is_learned) and meaning.role != "safety" and meaning.part != BUILT_AS
+    is_learned = suspect is not None and suspect.is_learned and meaning is not None and meaning.role in LEARNED
+    is_kept = not mended(first.name) if meaning is None else meaning.role == "safety" or meaning.part == BUILT_AS
+    is_carried = (measured is not None or is_learned) and not is_kept
     return Advisable(
         first.name,
         float(setting.value),
@@ -98,7 +103,7 @@ def outside_option(name: str, default: float | None, vehicle: Vehicle) -> Variab
     return Variable(
         name=name,
         role=Role.OPTION,
-        type=_type(fact),
+        type=_type(name, fact),
         unit="" if fact is None else fact.unit,
         doc="" if fact is None else fact.line,
         range=None if fact is None or fact.low is None or fact.high is None else (fact.low, fact.high),
@@ -109,7 +114,9 @@ def outside_option(name: str, default: float | None, vehicle: Vehicle) -> Variab
     )
 
 
-def _type(fact: Fact | None) -> ValueType:
+def _type(name: str, fact: Fact | None) -> ValueType:
+    if (known := mended(name)) in get_args(ValueType):
+        return cast(ValueType, known)
     is_code = fact is not None and bool(fact.values) and fact.low is None
     return "int" if is_code else "float"
 

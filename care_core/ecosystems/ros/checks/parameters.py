@@ -24,6 +24,13 @@ COMPLAINTS = int(LIMITS.add("complaints of a delay or a rate", 10, "", "of 58 dr
 STOPPED_S = LIMITS.add("delay from which it is a transform that stopped", 2.0, "s", "no robot drives on such a pose")
 ROUNDED = LIMITS.add("how far apart a parameter and a message's figure of it are", 0.006, "", "two places are told")
 MARGIN = LIMITS.add("tolerance over the delay", 1.5, "", "a choice: delays vary")
+ANSWER_MS = LIMITS.add("wait for an answer that a busy computer may miss", 100.0, "ms", "Nav2's default is 20")
+ENOUGH_MS = LIMITS.add(
+    "wait for an answer that is suggested", 1000.0, "ms", "none of 700 missions on two busy cores missed it"
+)
+GAVE_UP_S = LIMITS.add(
+    "time from giving up the wait to the end of the goal", 1.0, "s", "the tree fails at its next tick"
+)
 _CLOCK = "/clock"
 _FRAMES = frozenset((
     "global_frame", "robot_base_frame", "base_frame_id", "odom_frame_id", "global_frame_id", "local_frame",
@@ -45,6 +52,9 @@ _NO_FRAME = re.compile(
     r"|invalid frame id \"([\w/]+)\"",
     re.IGNORECASE,
 )
+_UNANSWERED = re.compile(
+    r"timed out while waiting for action server to acknowledge goal request for (\S+)", re.IGNORECASE
+)
 
 Held = Mapping[tuple[str, ...], Setting]
 """Parameters by the parts of their names."""
@@ -62,6 +72,7 @@ def find(drive: Drive) -> Iterator[Finding]:
     yield from _clocks(drive, held)
     yield from _delays(drive, held)
     yield from _rates(drive, held)
+    yield from _answers(drive, held)
 
 
 def _finding(
@@ -182,6 +193,22 @@ def _rates(drive: Drive, held: Held) -> Iterator[Finding]:
                 f"{node} complains {len(late)} times", "/rosout, times of recording", 0.7,
                 wanted=_wanted(period_s),
             )  # fmt: skip
+
+
+def _answers(drive: Drive, held: Held) -> Iterator[Finding]:
+    """A wait for an action server so short that the tree gave the goal up, where the server was only slow to answer."""
+    unanswered = [(one, match[1]) for one in drive.log_messages if (match := _UNANSWERED.search(one.text)) is not None]
+    ends = [goal.end_s for goal in drive.missed]
+    lost = [server for one, server in unanswered if any(abs(end - one.time_s) <= GAVE_UP_S for end in ends)]
+    # The navigator's action node holds a copy of it.
+    settings = [one for keys, one in held.items() if keys[-2:] == ("bt_navigator", "default_server_timeout")]
+    short = [one for one in settings if not isinstance(one.value, str) and float(one.value) <= ANSWER_MS]
+    if lost and short:
+        yield _finding(
+            drive, "software", short, f"{lost[-1]} did not answer in so many ms, and the goal was given up",
+            f"{len(unanswered)} waits for an answer ran out; a longer wait costs nothing where answers come",
+            "/rosout", 0.7, wanted=ENOUGH_MS,
+        )  # fmt: skip
 
 
 def _wanted(seconds: float) -> float:
