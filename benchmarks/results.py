@@ -91,6 +91,20 @@ BENCHMARKS = (
         "cause first in 80 %",
         "plain classifier with the same contexts",
     ),
+    Benchmark(
+        "nav2_mppi",
+        "benchmarks.flown {tables}/nav2-mppi/flown.yaml --profile profiles/nav2-mppi --table {tables}/nav2-mppi.csv"
+        " --faults 30 --resets alone --seed 91001 -o {tables}/nav2-mppi/flown",
+        "promised is true within 0.07; cause first above the peers",
+        "furthest option, plain classifier",
+    ),
+    Benchmark(
+        "nav2_rpp",
+        "benchmarks.flown {tables}/nav2-rpp/flown.yaml --profile profiles/nav2-rpp --table {tables}/nav2-rpp.csv"
+        " --faults 20 --resets pairs --seed 92001 -o {tables}/nav2-rpp/flown",
+        "promised is true within 0.07; cause first above the peers",
+        "furthest option, plain classifier",
+    ),
     Benchmark("ros_health", "benchmarks.ros_health {shared}/data/ros_hardware", "kind in three in 70 %", "none known"),
     Benchmark("wild_logs", "benchmarks.wild_logs --shared {shared}", "no crash, each refusal a sentence", "none known"),
     Benchmark("hostile_files", "benchmarks.hostile_files", "1000 MB and 20 s", "none known"),
