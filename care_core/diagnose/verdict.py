@@ -27,6 +27,7 @@ STATUS_WORDS: dict[RunStatus, str] = {
     "not_evaluated": "NOT EVALUATED",
     "unreadable": "UNREADABLE",
 }
+UNKNOWN_PARAMETER = "a parameter that the profile does not know"
 GUESS = "\u00a0probability\u00a0(a\u00a0guess)"
 NO_LIMIT = "no limit of this mission is known; what happened is told below"
 NO_LIMITS = "no limits for time and energy, no causes by parameters"
@@ -407,7 +408,7 @@ def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = (), outsi
 def _explanation(one: Hypothesis, findings: Sequence[SeenFinding], outside: Sequence[SeenSuspect]) -> str:
     """A finding that is itself a symptom stands for what the log does not show."""
     if one.what == "parameter" and not one.name:
-        return "a parameter that the profile does not know"
+        return UNKNOWN_PARAMETER
     if one.what == "parameter":
         return f"the parameter {next((suspect.text for suspect in outside if suspect.name == one.name), one.name)}"
     if one.name:

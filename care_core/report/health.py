@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
-from care_core.diagnose.verdict import Reason
+from care_core.diagnose.verdict import UNKNOWN_PARAMETER, Reason
 from care_core.ecosystems.findings import Event, Finding
 from care_core.report.entries import EventEntry, FindingEntry
 from care_core.report.wording import SEVERITY_WORDS, noted
@@ -84,4 +84,4 @@ def reason_lines(reasons: Sequence[Reason]) -> Iterator[str]:
     for one in reasons[:REASONS_SHOWN]:
         yield from wrapped(one.text, f"  {one.probability:>4.0%}  ")
     if more := [one for one in reasons[REASONS_SHOWN:] if one.is_parameter]:
-        yield from wrapped(f"less likely: {', '.join(one.name for one in more)}", " " * 8)
+        yield from wrapped(f"less likely: {', '.join(one.name or UNKNOWN_PARAMETER for one in more)}", " " * 8)

@@ -26,6 +26,9 @@ class Keys(Static):
     def on_mount(self) -> None:
         self.screen.bindings_updated_signal.subscribe(self, self.tell)
 
+    def on_resize(self) -> None:
+        self.tell(self.screen)
+
     def tell(self, screen: Screen[object]) -> None:
         """Show the keys that work now."""
         shown = {

@@ -12,13 +12,23 @@ import pytest
 import care_core
 from care_core.application.case import Case
 from care_core.diagnose.records import MissionVerdict, ObjectiveResult
-from care_core.diagnose.verdict import STATUS_WORDS, Advice, Verdict, compose, exit_code, verdict_of
+from care_core.diagnose.verdict import (
+    STATUS_WORDS,
+    UNKNOWN_PARAMETER,
+    Advice,
+    Reason,
+    Verdict,
+    compose,
+    exit_code,
+    verdict_of,
+)
 from care_core.ecosystems.findings import Finding
 from care_core.errors import ExitCode, UsageError
 from care_core.files import bundled
 from care_core.records import replace
 from care_core.report.document import build_document, remembered_verdict
 from care_core.report.formats import FORMATS
+from care_core.report.health import REASONS_SHOWN, reason_lines
 from care_core.report.reading import document_of
 from care_core.report.terminal import to_text
 from care_core.report.writers import to_json
@@ -177,3 +187,9 @@ def test_a_good_mission_that_was_flown_last_hides_none_that_failed() -> None:
     assert verdict_of(replace(good, missions=(fine, replace(failed, mission=good.run.mission)))).others == ""
     document = build_document(replace(good, missions=(fine, failed)))
     assert remembered_verdict(document).others == verdict.others
+
+
+def test_what_is_less_likely_is_named_where_nothing_has_a_name() -> None:
+    leading = [Reason(0.3, "the parameter a", "a", True)] * REASONS_SHOWN
+    rest = [Reason(0.05, "", "", True), Reason(0.04, "bad luck", ""), Reason(0.03, "the parameter b", "b", True)]
+    assert list(reason_lines([*leading, *rest]))[-1] == f"{' ' * 8}less likely: {UNKNOWN_PARAMETER}, b"
