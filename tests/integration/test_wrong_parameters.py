@@ -103,3 +103,21 @@ def test_of_two_that_contradict_each_other_the_one_far_from_its_default_is_named
     assert "min_vel_x" in names
     assert "/move_base/DWAPlannerROS/max_vel_x" not in names
     assert "/move_base/controller_patience" in names
+
+
+UNANSWERED = "Timed out while waiting for action server to acknowledge goal request for follow_path"
+WAIT = "/bt_navigator.default_server_timeout"
+
+
+def test_a_wait_for_an_answer_that_is_too_short_is_made_longer(tmp_path: Path) -> None:
+    log = drive(tmp_path / "drive.mcap", ("/bt_navigator", "default_server_timeout", 20), complaints=[UNANSWERED])
+    diagnosis = diagnosed(log)
+    assert diagnosis.hypotheses[0].name == WAIT
+    assert diagnosis.fix is not None
+    assert [(change.option.name, change.suggested) for change in diagnosis.fix.changes] == [(WAIT, 1000.0)]
+
+
+def test_a_server_that_is_late_for_a_long_wait_is_the_computers_fault(tmp_path: Path) -> None:
+    diagnosis = diagnosed(drive(tmp_path / "drive.mcap", complaints=[UNANSWERED]))
+    assert diagnosis.hypotheses[0].name.startswith("the computer is too busy: follow_path did not answer")
+    assert diagnosis.fix is None
