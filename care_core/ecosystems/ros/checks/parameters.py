@@ -27,10 +27,13 @@ ROUNDED = LIMITS.add("how far apart a parameter and a message's figure of it are
 MARGIN = LIMITS.add("tolerance over the delay", 1.5, "", "a choice: delays vary")
 ANSWER_MS = LIMITS.add("wait for an answer that a busy computer may miss", 100.0, "ms", "Nav2's default is 20")
 ENOUGH_MS = LIMITS.add(
-    "wait for an answer that is suggested", 1000.0, "ms", "none of 700 missions on two busy cores missed it"
+    "wait for an answer that is suggested", 1000.0, "ms", "a choice: a wait costs nothing where answers come"
 )
 LATE = LIMITS.add(
-    "probability that a late answer ended the goal", 0.9, "", "58 of 600 missions of Nav2 on two busy cores ended so"
+    "probability that a late answer ended the goal",
+    0.9,
+    "",
+    "of 705 missions of Nav2 driven ahead of real time 69 ended so",
 )
 GAVE_UP_S = LIMITS.add(
     "time from giving up the wait to the end of the goal", 1.0, "s", "the tree fails at its next tick"
