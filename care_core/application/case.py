@@ -120,7 +120,8 @@ def open_case(request: Request, progress: Progress) -> Case:
         model = _model_of(log, profile, configs)
         progress("looking at what happened", 0.1)
         health = examine(model)
-        if said := model.plugins():  # which tells what neither the log's parameters nor a file may have told
+        said = model.plugins()
+        if not said.keys() <= log.settings().keys():  # messages tell what the log's parameters do not
             profile, choice = choose(log, request.profile, configs, said)
         reading = None
         if profile is not None:

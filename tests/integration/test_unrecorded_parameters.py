@@ -73,6 +73,12 @@ def said(node: str, text: str) -> LogMessage:
     return LogMessage(0.0, 2, node, text)
 
 
+def test_the_controller_behind_a_rotation_shim_is_said_as_well() -> None:
+    rpp = "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"
+    told = created([said("controller_server", f"Created internal controller for rotation shimming: X of type {rpp}")])
+    assert {name: one.value for name, (one,) in told.items()} == {"/controller_server.X.primary_controller": rpp}
+
+
 @pytest.mark.parametrize(
     ("made", "list"),
     [

@@ -24,6 +24,7 @@ _NAME = r"[\w-]+"
 _CREATED = re.compile(
     rf"Created (controller :|global planner plugin|goal checker :|progress_checker :) ({_NAME}) of type ([\w:/]+)"
 )
+_SHIMMED = re.compile(rf"Created internal controller for rotation shimming: ({_NAME}) of type ([\w:/]+)")
 _LIST_OF = {
     "controller :": "controller_plugins", "global planner plugin": "planner_plugins",
     "goal checker :": "goal_checker_plugins", "progress_checker :": "progress_checker_plugins",
@@ -54,8 +55,10 @@ def created(messages: Iterable[LogMessage]) -> dict[str, tuple[Setting, ...]]:
     classes: dict[str, str] = {}
     lists: dict[str, dict[str, None]] = {}
     for one in messages:
+        node = f"/{one.node.strip('/').replace('.', '/')}"
+        if (behind := _SHIMMED.match(one.text)) is not None:
+            classes[f"{node}.{behind[1]}.primary_controller"] = behind[2]
         if (said := _CREATED.match(one.text)) is not None:
-            node = f"/{one.node.strip('/').replace('.', '/')}"
             classes[f"{node}.{said[2]}.plugin"] = said[3]
             lists.setdefault(f"{node}.{_LIST_OF[said[1]]}", {})[said[2]] = None
     told = {**classes, **{name: " ".join(names) for name, names in lists.items()}}
