@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from care_core.configs.loading import ConfigFile, resolve
-from care_core.ecosystems.ros import ros2_yaml
+from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.run import Setting
@@ -34,4 +34,4 @@ def _parameters(schema: Schema) -> Iterable[str]:
 
 
 def _names_nodes(file: ConfigFile) -> bool:
-    return file.format.functions is ros2_yaml
+    return file.format is ROS2_YAML
