@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, TypeGuard
 
 from care_core.records import Record, field
@@ -45,6 +45,8 @@ class Setting(Record):
     """Seconds from the start of the log of the last change after the first value, None when it never changed."""
 
 
+Settings = Mapping[str, Sequence[Setting]]
+"""By parameter the values that it had, in order of time."""
 Find = Callable[[str], Setting | None]
 """What files give a parameter, by its name in a log; None where they give nothing."""
 

@@ -25,11 +25,10 @@ if TYPE_CHECKING:
     from care_core.ecosystems.base import RunModel
     from care_core.ecosystems.findings import Health
     from care_core.ecosystems.ros.drive import Drive
-    from care_core.extract.known import Settings
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
     from care_core.profile.store import Profile
-    from care_core.run import ProfileChoice, Robot, Setting
+    from care_core.run import ProfileChoice, Robot, Setting, Settings
     from care_core.variables import Variable
 
 NOTHING: Settings = MappingProxyType({})

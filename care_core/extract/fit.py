@@ -5,15 +5,13 @@ Asked before anything is judged. What the mission and its conditions add is know
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 
 from care_core.ecosystems.vehicles import UNLIKE_ROVERS, Vehicle, vehicle_of
 from care_core.extract.coverage import Coverage, wrong_kind
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
-from care_core.run import FITS, Fit, Setting
-
-Settings = Mapping[str, Sequence[Setting]]
+from care_core.run import FITS, Fit, Settings
 
 MOST = 0.7
 """Share of a profile's options, and of its sources, that a log holds when it fits: some sources stand in for others,

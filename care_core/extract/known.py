@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from care_core.configs.loading import ConfigFile, resolve
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
-from care_core.run import Setting
-
-Settings = Mapping[str, Sequence[Setting]]
+from care_core.run import Settings
 
 
 def known_settings(log: Log, files: Sequence[ConfigFile], said: Settings, schemas: Iterable[Schema]) -> Settings:

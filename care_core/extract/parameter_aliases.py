@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 from care_core.ecosystems.ros.plugin_names import named_here
 from care_core.ecosystems.vehicles import alias_in, vehicle_of
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.records import replace
-from care_core.run import Setting
+from care_core.run import Settings
 from care_core.variables import Role, Variable
-
-Settings = Mapping[str, Sequence[Setting]]
 
 
 def with_logged_names(schema: Schema, log: Log, known: Settings | None = None) -> Schema:

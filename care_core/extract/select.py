@@ -7,12 +7,12 @@ from typing import Protocol, TypeVar
 
 from care_core.errors import LogError, ProfileError
 from care_core.extract.coverage import Coverage, cover
-from care_core.extract.fit import Settings, fit_of
+from care_core.extract.fit import fit_of
 from care_core.extract.read import reading_plan
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, available_profiles, load_profile
-from care_core.run import Fit, ProfileChoice
+from care_core.run import Fit, ProfileChoice, Settings
 
 NEARLY_AS_WELL = 0.9
 """Another profile is named when it matches at least this share of what the chosen one does."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from care_core.ecosystems.ros.node_messages import LogMessage
-from care_core.run import Setting
+from care_core.run import Setting, Settings
 
 _LISTS = {
     "FollowPath": "controller_plugins",
@@ -30,8 +30,6 @@ _LIST_OF = {
     "goal checker :": "goal_checker_plugins", "progress_checker :": "progress_checker_plugins",
 }  # fmt: skip
 """What Nav2's servers (humble to lyrical) call a plugin when they say that they made one, and their list of such."""
-
-Settings = Mapping[str, Sequence[Setting]]
 
 
 def named_here(name: str, settings: Settings) -> str:
