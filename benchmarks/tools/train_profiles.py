@@ -112,17 +112,18 @@ SOURCES = {
     ),
     "nav2-mppi": Source(
         ("data/nav2-mppi/table.tar.xz",),
-        "252 missions of Nav2 1.3.13 (ROS 2 Jazzy: MPPI, NavFn, the standard tree for one goal) that drove this "
+        "414 missions of Nav2 1.3.13 (ROS 2 Jazzy: MPPI, NavFn, the standard tree for one goal) that drove this "
         "project's simulated robot (`samples/nav2_robot`) in worlds and to goals that differ, under random "
-        "configurations, some with most and some with few options off the reference, by `care collect`; MCAP files, "
-        "read by `care ingest`.",
+        "configurations, some with most and some with few options off the reference, by `care collect`; missions in"
+        " which a server's answer came too late for the machine are left out; MCAP files, read by `care ingest`.",
     ),
     "nav2-rpp": Source(
         ("data/nav2-rpp/table.tar.xz",),
-        "231 missions of Nav2 1.3.13 (ROS 2 Jazzy: Regulated Pure Pursuit, NavFn, the standard tree for one goal) that "
-        "drove this project's simulated robot (`samples/nav2_robot`) in worlds and to goals that differ, under random "
-        "configurations, some with most and some with few options off the reference, by `care collect`; MCAP files, "
-        "read by `care ingest`.",
+        "222 missions of Nav2 1.3.13 (ROS 2 Jazzy: Regulated Pure Pursuit, NavFn, the standard tree for one goal) "
+        "that drove this project's simulated robot (`samples/nav2_robot`) in worlds and to goals that differ, under"
+        " random configurations, some with most and some with few options off the reference, by `care collect`; "
+        "missions in which a server's answer came too late for the machine are left out; MCAP files, read by `care "
+        "ingest`.",
     ),
     "husky-care": Source(
         ("data/care/care_husky_sim_399.csv",),

@@ -119,8 +119,7 @@ def open_case(request: Request, progress: Progress) -> Case:
         model = _model_of(log, profile, configs)
         progress("looking at what happened", 0.1)
         health = examine(model)
-        said = model.plugins()
-        if not said.keys() <= log.settings().keys():  # messages tell what the log's parameters do not
+        if said := _said_alone(model):
             profile, choice = choose(log, request.profile, configs, said)
         reading = None
         if profile is not None:
@@ -147,8 +146,15 @@ def read_case(request: Request, progress: Progress) -> Reading:
         profile, choice = fitting(log, request.profile, configs)
         model = _model_of(log, profile, configs)
         health = examine(model)
-        profile, choice = fitting(log, request.profile, configs, model.plugins())
+        if said := _said_alone(model):
+            profile, choice = fitting(log, request.profile, configs, said)
         return _read(model, profile, choice, health, request, configs, progress, sha256)
+
+
+def _said_alone(model: RunModel) -> Settings:
+    """What messages say that the robot is put together from, where its parameters in the log do not tell all of it."""
+    said = model.plugins()
+    return NOTHING if said.keys() <= model.log.settings().keys() else said
 
 
 def _model_of(log: Log, profile: Profile | None, configs: Sequence[ConfigFile]) -> RunModel:

@@ -42,12 +42,12 @@ class Keys(Static):
     def _fitting(self, bindings: list[Binding]) -> Content:
         """The keys that the line has room for: help stays, which lists them all, and the way back is known best."""
         width = self.size.width or self.app.size.width
-        own = [one for one in bindings if one.id not in _ALWAYS]
-        always = [one for one in bindings if one.id in _ALWAYS]
-        own.sort(key=lambda one: one.id == _BACK)
-        while own and joined([self._key(one) for one in (*own, *always)], "  ").cell_length > width:
-            own.pop()
-        return cut(joined([self._key(one) for one in (*own, *always)], "  "), width, self._glyphs)
+        always = [self._key(one) for one in bindings if one.id in _ALWAYS]
+        own = sorted((one for one in bindings if one.id not in _ALWAYS), key=lambda one: one.id == _BACK)
+        keys = [self._key(one) for one in own]
+        while keys and joined([*keys, *always], "  ").cell_length > width:
+            keys.pop()
+        return cut(joined([*keys, *always], "  "), width, self._glyphs)
 
     def _key(self, binding: Binding) -> Content:
         return Content.assemble(

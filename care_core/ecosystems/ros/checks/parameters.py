@@ -265,7 +265,8 @@ def _settings(held: Held, name: str, value: float) -> list[Setting]:
 READS = reading(*ROSOUT, ODOMETRY, SCAN, *TF, TREE, *GOALS)
 CHECK = Check(
     "parameters",
-    "topics, frames and clocks that parameters name and the recording lacks, tolerances below what is measured",
+    "topics, frames and clocks that parameters name and the recording lacks, tolerances below what is measured, waits "
+    "that ran out",
     READS,
     LIMITS,
     find,
