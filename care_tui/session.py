@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -189,11 +190,18 @@ class Session(Struct, eq=False):
 
     def current(self, option: Variable) -> float | None:
         """The option's value in this run; where no source holds it, what the engine took it to be."""
-        run, reading = self.diagnosis.run, self.case and self.case.reading
-        reference = reading.judged.reference.config if reading else {}
+        run, reference = self.diagnosis.run, self._reference()
         if option.name not in reference and (setting := run.settings.get(option.name)) is not None:
             return as_number(setting.value)
         return run.config.get(option.name, reference.get(option.name, option.default))
+
+    def reference(self, option: Variable) -> float | None:
+        """The value of the configuration that the run is held against; None where there is none."""
+        return self._reference().get(option.name, option.default)
+
+    def _reference(self) -> Mapping[str, float]:
+        reading = self.case and self.case.reading
+        return reading.judged.reference.config if reading else {}
 
     def is_assumed(self, option: Variable) -> bool:
         """Whether no source holds the option's value."""

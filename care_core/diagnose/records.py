@@ -193,6 +193,11 @@ class Fix(Record):
         return None if self.shown_by else self.p_fixed
 
     @property
+    def why_not_measured(self) -> str:
+        """Why it promises nothing; empty where it does."""
+        return f"this run shows it ({self.shown_by}), training says too little of it" if self.shown_by else ""
+
+    @property
     def is_guess(self) -> bool:
         """Whether it takes a value that no training run came near: beside every probability that is said."""
         return not all(change.in_support for change in self.changes)

@@ -153,6 +153,8 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         return
     as_driven = diagnosis.odds_as_driven
     yield from wrapped(f"Fix ({promise(fix.odds, as_driven, fix.is_guess)})")
+    if fix.why_not_measured:
+        yield from wrapped(f"odds not measured: {fix.why_not_measured}", "  ", "    ")
     for change in fix.changes:
         option = change.option
         restart = ", needs a restart" if option.reboot_required else ""

@@ -95,6 +95,8 @@ class FixPage(DiagnosisPage):
         shown = session.fix if ticked else session.unchanged
         if shown is not None:
             rows += outcome_rows(shown, session.diagnosis.objectives, self.glyphs)
+            if shown.why_not_measured:
+                rows.append(warning("Odds", f"not measured: {shown.why_not_measured}"))
             rows += [warning("Unless", f"it happens again: {title}") for title in session.diagnosis.lost_by]
         if option is not None:
             rows += [Row(Content()), *option_rows(option, self._caveats(option), self.glyphs)]
@@ -104,6 +106,9 @@ class FixPage(DiagnosisPage):
         session, value = self.session, self.session.basket.values.get(option.name)
         notes = [note for change in (session.fix.changes if session.fix else ()) if change.option.name == option.name
                  for note in change.notes]  # fmt: skip
+        if value is not None and self._is_past_reference(option, value):
+            reference = option.show(session.reference(option) or 0.0)
+            notes.append(f"past its reference, {reference}: a suggestion stops there, as far as it is known to work")
         if option.safety and value is not None and value != option.default:
             notes.append("a safety parameter: think twice before it leaves its default")
         if value is not None and not is_advisable(option, value):
@@ -111,6 +116,13 @@ class FixPage(DiagnosisPage):
         if option.name in session.dismissed:
             notes.append(f"set aside: {session.dismissed[option.name]}")
         return notes
+
+    def _is_past_reference(self, option: Variable, value: float) -> bool:
+        """Whether the value lies on the other side of the reference than that of the run."""
+        current, reference = self.session.current(option), self.session.reference(option)
+        if current is None or reference is None or option.labels or option.type == "bool":
+            return False
+        return (value - reference) * (reference - current) > 0
 
     # What the keys do
 

@@ -17,6 +17,8 @@ from care_tui.session import Session
 
 _LABEL = 9
 _FITS = "profile fits"
+_LEAST = 12
+"""Cells that are left of a change, however narrow the terminal."""
 
 
 def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) -> list[Content]:
@@ -36,7 +38,7 @@ def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) 
         step, fraction = session.progress or ("starting", 0.0)
         head = Content.assemble("Reading ", (name, "bold"), ("  esc stops", "dim"))
         return [head, progress_bar(fraction, glyphs) + text(f"  {step}")]
-    lines = [_head(session.diagnosis, glyphs, width), *_cause_and_change(session, glyphs, is_low=is_low)]
+    lines = [_head(session.diagnosis, glyphs, width), *_cause_and_change(session, glyphs, width, is_low=is_low)]
     return [*lines, *_limits(session.diagnosis, is_low=is_low)]
 
 
@@ -46,12 +48,11 @@ def _head(diagnosis: Diagnosis, glyphs: Glyphs, width: int) -> Content:
     told = Content.assemble(status(verdict.status, glyphs), "  ", (clean(verdict.failed), "bold"))
     if diagnosis.profile.fit.verdict != "fits":
         return told
-    room = width - len(_FITS) - 2
-    cut = told if told.cell_length <= room else told.truncate(room - 1) + glyphs.more
+    cut = _cut(told, width - len(_FITS) - 2, glyphs)
     return cut.pad_right(width - len(_FITS) - cut.cell_length) + Content.styled(_FITS, "dim")
 
 
-def _cause_and_change(session: Session, glyphs: Glyphs, *, is_low: bool) -> Iterator[Content]:
+def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) -> Iterator[Content]:
     diagnosis = session.diagnosis
     hypotheses = session.hypotheses()
     if hypotheses:
@@ -67,7 +68,7 @@ def _cause_and_change(session: Session, glyphs: Glyphs, *, is_low: bool) -> Iter
         )
     elif causes := [cause for fault in diagnosis.faults for cause in fault.causes if not cause.is_lead]:
         yield _labelled("Cause") + text(causes[0].option.name, "bold")
-    change = _change(session, glyphs)
+    change = _change(session, glyphs, width)
     if change is not None:
         yield change
     if diagnosis.abstained:
@@ -76,8 +77,8 @@ def _cause_and_change(session: Session, glyphs: Glyphs, *, is_low: bool) -> Iter
         yield _labelled("Change") + Content("none is known that helps")
 
 
-def _change(session: Session, glyphs: Glyphs) -> Content | None:
-    """What is ticked, with the odds of it and without it; None where nothing is."""
+def _change(session: Session, glyphs: Glyphs, width: int) -> Content | None:
+    """What is ticked, with the odds of it and without it, of which none is cut off; None where nothing is."""
     ticked = session.basket.ticked
     options = {option.name: option for option in session.options()} if ticked else {}
     if not ticked:
@@ -99,9 +100,10 @@ def _change(session: Session, glyphs: Glyphs) -> Content | None:
     beside = Content.styled("" if without is None else f"  without {percent(without)}", "dim")
     again = Content.styled("  unless it happens again", "$text-warning") if session.diagnosis.lost_by else Content()
     is_advised = not session.only_asked and not session.diagnosis.abstained
-    return Content.assemble(
-        _labelled("Change" if is_advised else "Asked"), odds, "  ", text(name, "bold"), " ", change, more, beside, again
-    )
+    head = _labelled("Change" if is_advised else "Asked") + odds + Content("  ")
+    tail = Content(more) + beside + again
+    room = max(width - head.cell_length - tail.cell_length, _LEAST)
+    return head + _cut(Content.assemble(text(name, "bold"), " ", change), room, glyphs) + tail
 
 
 def _limits(diagnosis: Diagnosis, *, is_low: bool) -> Iterator[Content]:
@@ -113,6 +115,10 @@ def _limits(diagnosis: Diagnosis, *, is_low: bool) -> Iterator[Content]:
         yield Content.styled(f"! {clean(verdict_of(diagnosis).fit)}", style)
     if found and not (is_low and fit.verdict != "fits"):
         yield Content.styled("! " + clean("; ".join(found)), "$text-warning")
+
+
+def _cut(line: Content, room: int, glyphs: Glyphs) -> Content:
+    return line if line.cell_length <= room else line.truncate(room - 1) + glyphs.more
 
 
 def _labelled(label: str) -> Content:

@@ -241,8 +241,10 @@ async def test_values_are_nudged_and_typed_as_whatif_takes_them_and_only_accepta
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4", "minus")
         assert walk(app).session.basket.ticked["LAND_SPEED"] < 50
+        assert "past its reference" not in text(app)
         await settle(pilot, "plus", "plus")
         assert walk(app).session.basket.ticked["LAND_SPEED"] > 50
+        assert "past its reference, 50: a suggestion stops there" in " ".join(text(app).split())
         await settle(pilot, "equals_sign", "x", "enter")
         assert isinstance(app.screen, Prompt)
         assert "from 30 to 200 cm/s" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]

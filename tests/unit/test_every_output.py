@@ -93,6 +93,20 @@ def test_every_output_says_how_well_the_profile_fits_behind_its_verdict(
     assert list(json.loads(whatif_json(asked, answer)))[:2] == ["schema", "fit"]
 
 
+def test_the_odds_without_a_change_are_never_cut_off() -> None:
+    made = made_diagnosis()
+    made = replace(made, odds_as_driven=0.02, health=replace(made.health, findings=()))
+    long = replace(LAND_SPEED, name="/controller_server.FollowPath.use_rotate_to_heading_allowed")
+    assert made.fix is not None
+    (change,) = made.fix.changes
+    session = opened(replace(made, fix=replace(made.fix, changes=(change, replace(change, option=long)))))
+    for width in (64, 79, 119):
+        (line,) = (one for one in answer_lines(session, UNICODE, width, is_low=False) if one.plain.startswith("Change"))
+        assert line.cell_length <= width
+        assert line.plain.startswith("Change   █████████░  90 %  land_speed")
+        assert line.plain.endswith(" and 1 more  without 2 %")
+
+
 def test_a_value_that_no_source_holds_is_shown_as_assumed_in_every_output(reading: Reading) -> None:
     made = made_diagnosis()
     assert made.fix is not None

@@ -174,7 +174,9 @@ def test_a_change_whose_odds_were_not_measured_says_so() -> None:
     assert document.fix.odds is None
     again = remembered_verdict(document_of(json.loads(to_json(document))))
     assert str(again.advice) == str(verdict_of(shown).advice)
-    assert "odds not measured" in flat(to_text(shown))
+    assert "odds not measured: this run shows it (pitch oscillates), training says too little of it" in flat(
+        to_text(shown)
+    )
 
 
 def test_a_good_mission_that_was_flown_last_hides_none_that_failed() -> None:
