@@ -9,11 +9,17 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
+from care_core import triage
+from care_core.application.case import Case, Request
 from care_core.errors import LogError
+from care_core.files import bundled
+from care_tui.app import CareApp
+from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
-from tests.tui.conftest import MakeApp, settle
+from tests.tui.conftest import MakeApp, fake_engine, settle
 
 SIZES = {"60x20": (60, 20), "80x24": (80, 24), "120x40": (120, 40), "170x45": (170, 45)}
+SAMPLE = bundled("samples", "arducopter_failed.BIN")
 SnapCompare = Callable[..., bool]
 
 pytestmark = pytest.mark.skipif(sys.version_info[:2] != (3, 11), reason="snapshots are made on Python 3.11 only")
@@ -48,6 +54,18 @@ def test_what_happened(
     snap_compare: SnapCompare, make_app: MakeApp, kind: str, step: str, size: tuple[int, int]
 ) -> None:
     assert snap_compare(make_app(getattr(sample, kind)()), terminal_size=size, run_before=press(step))
+
+
+@pytest.fixture(scope="module")
+def flight() -> Case:
+    return triage(SAMPLE)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
+@pytest.mark.parametrize("key", ["m", "p", "M", "w", "v"], ids=["messages", "plots", "map", "graph", "contents"])
+def test_views(snap_compare: SnapCompare, flight: Case, size: tuple[int, int], key: str) -> None:
+    app = CareApp(Request(SAMPLE), engine=fake_engine(lambda *_: flight), settings=Settings(places=()))
+    assert snap_compare(app, terminal_size=size, run_before=press("1", key))
 
 
 def test_smallest_terminal(snap_compare: SnapCompare, make_app: MakeApp) -> None:
