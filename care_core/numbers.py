@@ -25,6 +25,17 @@ def six_digits(value: float) -> float:
     return float(f"{value:.6g}")
 
 
+def logit(share: Floats, nearest: float) -> Floats:
+    """The logarithm of the odds of probabilities, none of which counts as nearer than that to 0 or 1."""
+    clipped = np.clip(share, nearest, 1.0 - nearest)
+    return np.asarray(np.log(clipped / (1.0 - clipped)))
+
+
+def logistic(odds: Floats) -> Floats:
+    """The probabilities of logarithms of odds."""
+    return np.asarray(1.0 / (1.0 + np.exp(-odds)))
+
+
 def distinct(values: NDArray[Any]) -> NDArray[Any]:
     """The distinct values of a flat array, ascending, NaN left out."""
     return np.unique(values[values == values])

@@ -26,6 +26,7 @@ from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import LEAST, TAIL, Mechanism, Posterior, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_CARRY_OVER, Mediation, Model, NoiseCarryOver, OutcomeRecord, StageRecord
 from care_core.causal.posteriors import PosteriorCache
+from care_core.causal.together import Together
 from care_core.constraints import Constraint
 from care_core.records import Record, field, replace
 from care_core.run import is_known
@@ -94,7 +95,8 @@ class CounterfactualQuery(Record, eq=False, dict=True):
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""
         outcome = self.model.outcomes[objective]
-        return self._functional(outcome, configs) if outcome.stages else self._continuous(outcome, configs)
+        told = self._functional(outcome, configs) if outcome.stages else self._continuous(outcome, configs)
+        return replace(told, p_ok=np.maximum(told.p_ok, self.probability(configs)))  # what is kept with all is kept
 
     def p_ok(self, objective: str, configs: Sequence[Config]) -> FloatArray:
         """The probability of `predict` alone, shape (m,): NaN where the objective has no threshold."""
@@ -110,11 +112,20 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         """Probability that every objective keeps its threshold, shape (m,).
 
         Objectives that move together (DESIGN: time and energy) share one cause: the least likely of a group counts
-        once; the rest multiply. What no mechanism predicts counts with its base rate.
+        once; the rest multiply, and runs that were left out say what to make of the product. What no mechanism
+        predicts counts with its base rate.
         """
         base = float(np.prod(list(self.base_rates().values())))
-        kept = self.all_kept([name for name in self.model.outcomes if name in self.thresholds], configs)
-        return np.full(len(configs), base) if kept is None else base * kept
+        kept = self.all_kept(list(self.model.outcomes), configs)
+        return np.full(len(configs), base) if kept is None else base * self._together.of_product(kept)
+
+    @cached_property
+    def _together(self) -> Together:
+        """What to make of the product of the single probabilities: as it is where other objectives are asked about
+        than those of the runs that were left out."""
+        held_out = self.model.skill.get("all")
+        is_all = self.model.outcomes.keys() <= self.thresholds.keys()
+        return Together.of(held_out.curve) if held_out is not None and is_all else Together()
 
     def all_kept(self, objectives: Sequence[str], configs: Sequence[Config]) -> FloatArray | None:
         """Probability that each of these keeps its threshold, shape (m,), those that move together counted once; None

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.kernel import Factor, FloatArray, Kernel, UniqueValues
 from care_core.causal.nominal import Nominal
-from care_core.numbers import quantile
+from care_core.numbers import logistic, quantile
 from care_core.records import Record
 
 Transform = Literal["identity", "log", "log1p"]
@@ -189,8 +189,7 @@ class Mechanism(Record, eq=False, dict=True):
     def probability_of(self, latent: FloatArray) -> FloatArray:
         """Binary targets: probability of 1 for values of the regression, of any shape."""
         slope, offset = self.calibration
-        probability: FloatArray = 1.0 / (1.0 + np.exp(-(slope * latent + offset)))
-        return np.clip(probability, TAIL, 1 - TAIL)
+        return np.clip(logistic(slope * latent + offset), TAIL, 1 - TAIL)
 
     def share_below(self, z: FloatArray) -> FloatArray:
         """Continuous targets: distribution function of the standardised error, kept off 0 and 1."""

@@ -18,6 +18,7 @@ from care_core.causal.kernel import FloatArray
 from care_core.configs.driven import same_value
 from care_core.diagnose.estimates import BY_CAUSES
 from care_core.diagnose.noisy_or import CHANCE, Key, NoisyOr
+from care_core.numbers import logistic, logit
 from care_core.records import Record, replace
 
 SURE = 0.002
@@ -76,15 +77,9 @@ class Promise(Record, eq=False):
         untouched = [key for key in self.failure.loses if key not in options and key != CHANCE]
         mechanisms = self.query.probability(configs) * (1.0 - self.failure.acts_among(untouched))
         causes = np.array([self.failure.repaired(keys) for keys in gone]) * self._others_kept(configs)
-        logit = (1.0 - BY_CAUSES.value) * _logit(mechanisms) + BY_CAUSES.value * _logit(causes)
-        return np.asarray(1.0 / (1.0 + np.exp(-logit)))
+        return logistic((1.0 - BY_CAUSES.value) * logit(mechanisms, SURE) + BY_CAUSES.value * logit(causes, SURE))
 
     def _others_kept(self, configs: Sequence[Config]) -> FloatArray:
         """Probability that the objectives which this run did not miss are met."""
         kept = self.query.all_kept([name for name in self.query.model.outcomes if name not in self.broken], configs)
         return np.ones(len(configs)) if kept is None else kept
-
-
-def _logit(share: FloatArray) -> FloatArray:
-    clipped = np.clip(share, SURE, 1.0 - SURE)
-    return np.asarray(np.log(clipped / (1.0 - clipped)))

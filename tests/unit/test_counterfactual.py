@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import TAIL
 from care_core.causal.model import NoiseCarryOver
+from care_core.causal.together import Together
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.run import Unavailable
@@ -119,12 +120,47 @@ def test_a_second_failure_is_evidence_against_chance(planted: Profile) -> None:
     assert probability[0] < probability[1] < probability[2]
 
 
+def test_runs_left_out_say_what_to_make_of_the_product_of_the_single_probabilities(planted: Profile) -> None:
+    here = query(planted, {})
+    modest = ((0.05, 0.02, 100), (0.55, 0.8, 100), (0.75, 0.97, 200))
+    told = replace(here, model=replace(planted.model, skill={"all": replace(planted.model.skill["all"], curve=modest)}))
+    plain = replace(here, model=replace(planted.model, skill={}))
+    configs = [DEFAULTS, {**DEFAULTS, "speed": 1.5}]
+    (good, bad), (as_product, bad_product) = told.probability(configs), plain.probability(configs)
+    assert as_product < good < 0.97
+    assert bad < bad_product < 0.05
+    for name in here.thresholds:
+        assert (told.predict(name, configs).p_ok >= told.probability(configs)).all(), "what is kept with all is kept"
+    only_time = {"time": BOUNDS["time"]}
+    assert replace(told, thresholds=only_time).probability(configs) == pytest.approx(
+        replace(plain, thresholds=only_time).probability(configs)
+    ), "they were asked about all objectives"
+
+
+@QUICK
+@given(
+    offset=st.floats(-1.5, 1.5), slope=st.floats(0.6, 1.6), runs=st.integers(40, 400),
+    shares=st.lists(st.floats(0.02, 0.98), min_size=5, max_size=10, unique=True),
+)  # fmt: skip
+def test_what_is_made_of_a_product_follows_the_runs_and_its_order(
+    offset: float, slope: float, runs: int, shares: list[float]
+) -> None:
+    truth = Together(offset, slope, best=1.0)
+    product = np.array(sorted(shares))
+    met = truth.of_product(product)
+    found = Together.of(list(zip(product.tolist(), met.tolist(), [runs] * len(product), strict=True)))
+    made = found.of_product(product)
+    assert np.abs(made - met).max() <= 0.1
+    assert (np.diff(made) >= 0).all()
+    assert Together.of(()).of_product(product) == pytest.approx(product)
+
+
 def test_an_objective_without_a_mechanism_counts_with_its_base_rate(planted: Profile) -> None:
     outcomes = {name: record for name, record in planted.model.outcomes.items() if name != "time"}
     blind = replace(query(planted, {}), model=replace(planted.model, outcomes=outcomes))
     rate = blind.base_rates()["time"]
     assert 0 < rate < 1
-    others = query(planted, {}, {name: BOUNDS[name] for name in outcomes}).probability([DEFAULTS])[0]
+    others = replace(blind, thresholds={name: BOUNDS[name] for name in outcomes}).probability([DEFAULTS])[0]
     assert blind.probability([DEFAULTS])[0] == pytest.approx(rate * others)
 
 
