@@ -101,9 +101,11 @@ def _change(session: Session, glyphs: Glyphs, width: int) -> Content | None:
     again = Content.styled("  unless it happens again", "$text-warning") if session.diagnosis.lost_by else Content()
     is_advised = not session.only_asked and not session.diagnosis.abstained
     head = _labelled("Change" if is_advised else "Asked") + odds + Content("  ")
-    tail = Content(more) + beside + again
-    room = max(width - head.cell_length - tail.cell_length, _LEAST)
-    return head + _cut(Content.assemble(text(name, "bold"), " ", change), room, glyphs) + tail
+    tail = Content(more) + beside
+    room = width - head.cell_length - tail.cell_length
+    if room - again.cell_length >= _LEAST:  # else the page of the fix says it
+        room, tail = room - again.cell_length, tail + again
+    return head + _cut(Content.assemble(text(name, "bold"), " ", change), max(room, _LEAST), glyphs) + tail
 
 
 def _limits(diagnosis: Diagnosis, *, is_low: bool) -> Iterator[Content]:
