@@ -1,9 +1,10 @@
 """Are the probabilities estimates, and how many missions does it take until a robot is repaired?
 
-    python -m benchmarks.odds FAULTS... [--most N]
+    python -m benchmarks.odds FAULTS... [--most N] [--profile NAME]
 
 Each folder holds failed missions with `truth.jsonl`: which resets were really flown or driven under the conditions of
-the failure (`tried`), and which repaired it (`fixing`). Nothing of them was used for training. Told are
+the failure (`tried`), and which repaired it (`fixing`); or it is what `benchmarks.flown --resets` left. Nothing of them
+was used for training. Told are
 
 - hypotheses: of every option that was off, and of hardware where some failed, how likely it acted, against whether it
   is in a set that repaired the mission; the leading ones apart;
@@ -30,12 +31,14 @@ from typing import Any
 import numpy as np
 
 import care_core
-from care_core.application.case import Case
+from benchmarks.flown import Done
+from care_core.application.case import Case, Request
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
 from care_core.errors import CareError
 from care_core.learn.skill import calibration_error, reliability
+from care_core.logs.finding import logs_below
 from care_core.records import Record, Struct, field
 
 HARDWARE = "hardware"
@@ -91,24 +94,40 @@ class Told(Struct, eq=False):
     missions: dict[str, list[int]] = field(default_factory=dict)
 
 
-def failures(folder: Path, most: int) -> Iterator[Failure]:
+def failures(folder: Path, most: int, profile: str | None) -> Iterator[Failure]:
     """Failed missions whose repair is known."""
-    rows = [json.loads(line) for line in (folder / "truth.jsonl").read_text(encoding="utf-8").splitlines()]
-    known = [row for row in rows if not row["ok"] and row.get("fixing")]
-    for row in known[:most]:
-        names = (folder / sub / f"{row['tag']}{end}" for sub in (".", "logs") for end in (".BIN", ".bag"))
-        log = next((path for path in names if path.exists()), None)
-        if log is None:
-            continue
+    recorded = (folder / "truth.jsonl").exists()
+    rows = _recorded(folder) if recorded else _flown(folder)
+    known = [(row, log) for row, log in rows if row.get("fixing") and log is not None]
+    for row, log in known[:most]:
         try:
-            yield Failure(row, care_core.triage(log))
+            yield Failure(row, care_core.triage(Request(log, profile=profile)))
         except CareError as err:
-            print(f"  {row['tag']}: {err.message}")
+            print(f"  {log}: {err.message}")
 
 
-def judge(folder: Path, most: int) -> Told:
+def _recorded(folder: Path) -> Iterator[tuple[Truth, Path | None]]:
+    for row in map(json.loads, (folder / "truth.jsonl").read_text(encoding="utf-8").splitlines()):
+        names = (folder / sub / f"{row['tag']}{end}" for sub in (".", "logs") for end in (".BIN", ".bag"))
+        if not row["ok"]:
+            yield row, next((path for path in names if path.exists()), None)
+
+
+def _flown(folder: Path) -> Iterator[tuple[Truth, Path | None]]:
+    """The faults of `benchmarks.flown`: where no option and no pair repairs one, all of them together may."""
+    for fault in Done(folder / "faults.jsonl").faults():
+        resets = fault.get("resets") or {}
+        alone, pairs = resets.get("alone") or {}, resets.get("pairs") or ()
+        fixing = [[name] for name, met in alone.items() if met] or [list(pair) for pair in pairs]
+        if resets.get("all") and not fixing:
+            fixing = [list(fault["off"])]
+        tried = [[[name], None, met] for name, met in alone.items()]
+        yield {"fixing": fixing, "tried": tried}, logs_below(folder / f"{fault['number']:04d}" / "fault" / "0")[0]
+
+
+def judge(folder: Path, most: int, profile: str | None) -> Told:
     told = Told()
-    for one in failures(folder, most):
+    for one in failures(folder, most, profile):
         told.failures += 1
         diagnosis = one.case.diagnosis
         told.flagged += bool(diagnosis.faults) or any(f.severity == "critical" for f in diagnosis.health.findings)
@@ -218,10 +237,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path, help="folders with truth.jsonl and logs")
     parser.add_argument("--most", type=int, default=10**9, help="so many failures of each")
+    parser.add_argument("--profile", help="a folder or a name, in place of the one that fits best")
     asked = parser.parse_args()
     os.environ["CARE_HISTORY"] = "off"  # simulated vehicles share a name, and a run of one is no good run of another
     for folder in asked.folders:
-        show(folder, judge(folder, asked.most))
+        show(folder, judge(folder, asked.most, asked.profile))
 
 
 if __name__ == "__main__":
