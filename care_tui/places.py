@@ -71,15 +71,16 @@ class LogFile(Record):
     is_recent: bool = False
 
 
-def found_logs(places: Iterable[Path], opened: Path | None = None) -> list[LogFile]:
-    """Logs of these folders, those opened before and the open one, the newest first.
+def found_logs(places: Iterable[Path], opened: Path | None = None, *, with_recent: bool = True) -> list[LogFile]:
+    """Logs of these folders and the open one, and those opened before, the newest first.
 
     What cannot be looked at is left out.
     """
     recent = recent_logs()
     files = [path for place in places if place.is_dir() for path in logs_in(place)]
     files += [] if opened is None else [opened]
-    unique = {path.absolute(): path.absolute() in recent for path in (*files, *recent)}
+    files += recent if with_recent else []
+    unique = {path.absolute(): path.absolute() in recent for path in files}
     logs = [log for path, is_recent in unique.items() if (log := _look(path, is_recent)) is not None]
     return sorted(logs, key=lambda log: -log.modified_s)
 

@@ -140,11 +140,10 @@ def _remembered() -> tuple[Triaged, ...]:
 
 
 def _past(triaged: Triaged) -> Past:
-    from care_core.report.document import remembered_verdict
+    from care_core.report.document import leading_cause, remembered_verdict
     from care_core.report.reading import remembered
 
     document = remembered(triaged.document)
-    causes = [cause.option for fault in document.faults for cause in fault.causes]
     return Past(
         at=triaged.at,
         log=triaged.log_path,
@@ -152,7 +151,7 @@ def _past(triaged: Triaged) -> Past:
         profile=document.profile.name if document.profile else "",
         fit=document.fit.verdict,
         verdict=remembered_verdict(document).headline,
-        cause=causes[0] if causes else "",
+        cause=leading_cause(document),
         values={entry.name: entry.value for entry in document.objectives},
         config=document.config,
     )

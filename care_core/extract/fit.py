@@ -60,11 +60,12 @@ def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle, settings: Setting
 
 def _other_plugin(schema: Schema, settings: Settings) -> str:
     """Which part of the stack is another than the profile was learned with; '' where none is known."""
-    for name, text in schema.plugins.items():
+    for name, learned in schema.plugins.items():
         for setting in settings.get(name, ()):
             behind = settings.get(name.replace(".plugin", _BEHIND), ()) if _SHIM in str(setting.value) else ()
-            if not any(text.casefold() in str(one.value).casefold() for one in (setting, *behind)):
-                return f"{name} is {setting.value}, the profile was learned with {text}"
+            told = " ".join(str(one.value) for one in (setting, *behind)).casefold()
+            if not any(text.casefold() in told for text in learned):
+                return f"{name} is {setting.value}, the profile was learned with {' or '.join(learned)}"
     return ""
 
 
@@ -72,9 +73,9 @@ def _unnamed(schema: Schema, settings: Settings) -> Iterator[str]:
     """What nobody says that the robot has, so that it may be another than the profile was learned with."""
     told = {key.casefold() for key in settings}
     learned = [
-        text
-        for name, text in schema.plugins.items()
-        if name not in settings and not any(text.casefold() in key for key in told)
+        " or ".join(texts)
+        for name, texts in schema.plugins.items()
+        if name not in settings and not any(text.casefold() in key for key in told for text in texts)
     ]
     if learned:
         yield f"nothing says that it drove with {' and '.join(learned)}, as in the profile's runs"

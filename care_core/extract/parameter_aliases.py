@@ -38,7 +38,7 @@ def _with_own_plugins(schema: Schema, logged: Settings) -> Schema:
         name: replace(one, parameters=tuple(named_here(key, logged) for key in one.parameters))
         for name, one in schema.variables.items()
     }
-    plugins = {named_here(name, logged): text for name, text in schema.plugins.items()}
+    plugins = {named_here(name, logged): texts for name, texts in schema.plugins.items()}
     return replace(schema, variables=variables, plugins=plugins)
 
 

@@ -78,8 +78,8 @@ class Schema(Record):
     change. Empty where it is."""
     constraints: tuple[Constraint, ...] = ()
     """What the stack asks of its options together: no suggestion and no mission of a campaign breaks it."""
-    plugins: Mapping[str, str] = field(default_factory=dict)
-    """Parameter that names a part of the stack -> what its value contains where it is the part learned from."""
+    plugins: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Parameter that names a part of the stack -> what its value contains one of where it is a part learned from."""
     firmware_window: tuple[tuple[int, ...], tuple[int, ...]] | None = None
     """First and last version of the firmware that the profile is good for, as far as each is written."""
     digest: str = ""

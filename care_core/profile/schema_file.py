@@ -218,7 +218,7 @@ class _Profile(Strict):
     logs: list[str] = Field(default_factory=list)
     observational: bool = False
     carried_over: str = ""
-    plugins: dict[str, str] = Field(default_factory=dict)
+    plugins: dict[str, str | list[str]] = Field(default_factory=dict)
     limits: list[str] = Field(default_factory=list)
     mission: dict[str, Any] = Field(default_factory=dict)
     evidence: list[_EvidenceRule] = Field(default_factory=list)
@@ -348,7 +348,7 @@ def _to_schema(data: _Profile) -> Schema:
         logs=tuple(data.logs),
         observational=data.observational,
         carried_over=data.carried_over,
-        plugins=data.plugins,
+        plugins={name: (one,) if isinstance(one, str) else tuple(one) for name, one in data.plugins.items()},
         constraints=tuple(_constraint(text, variables) for text in data.limits),
         mission=data.mission,
         evidence=tuple(map(_to_rule, data.evidence)),

@@ -376,6 +376,14 @@ def remembered_verdict(document: TriageDocument) -> Verdict:
     )
 
 
+def leading_cause(document: TriageDocument) -> str:
+    """What explains the failure of a document that was read back best: a parameter, a finding, or chance in words; of
+    a run that nothing else could explain, the option that ranks first. Empty where there is none."""
+    for reason in remembered_verdict(document).reasons[:1]:
+        return reason.name or reason.text
+    return next((cause.option for fault in document.faults for cause in fault.causes), "")
+
+
 def _advice(document: TriageDocument) -> Advice:
     fix = document.fix
     if fix is None:

@@ -11,7 +11,7 @@ from care_core.history.store import HistoryError, Triaged, Verified
 from care_core.history.track_record import Bin, sparkline, track_record, trends
 from care_core.history.trends import LEAST_RUNS, Direction, RobotRuns, Since, Trend, by_robot
 from care_core.records import field
-from care_core.report.document import remembered_verdict
+from care_core.report.document import leading_cause, remembered_verdict
 from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import remembered
 from care_core.run import FitVerdict, Robot
@@ -135,7 +135,6 @@ def history_document(
 
 def _past(triaged: Triaged) -> PastTriage:
     document = remembered(triaged.document)
-    causes = [cause.option for fault in document.faults for cause in fault.causes]
     fix = document.fix
     return PastTriage(
         at=triaged.at,
@@ -145,7 +144,7 @@ def _past(triaged: Triaged) -> PastTriage:
         profile=document.profile.name if document.profile else "",
         faults=[fault.objective for fault in document.faults],
         verdict=remembered_verdict(document).headline,
-        cause=causes[0] if causes else None,
+        cause=leading_cause(document) or None,
         options=[change.option for change in fix.changes] if fix else [],
         p_fixed=fix.odds if fix else None,
         odds_as_driven=document.odds_as_driven,

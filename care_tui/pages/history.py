@@ -92,7 +92,7 @@ class HistoryPage(Page):
             labelled("Verdict", past.verdict),
         ]
         if past.cause:
-            rows.append(labelled("First cause", past.cause))
+            rows.append(labelled("Cause", past.cause))
         until = [run for run in reversed(runs[index:]) if run.profile == past.profile]
         rows += [Row(Content()), _columns("Objective", "this run", f"{len(until)} runs up to it", "bold")]
         for name, value in past.values.items():

@@ -77,11 +77,12 @@ class LogsPage(Page):
 
     def enter(self) -> None:
         places, opened = self.workspace.places, self.session.path
+        is_usual = self.workspace.folder is None  # of a folder that was named nothing else is wanted
         found = self._answers.get(LOGS)
         if isinstance(found, list) and opened is not None and opened not in [log.path for log in found]:
             self.forget(LOGS)
         # After the first frame, as the reading of the log.
-        self.call_after_refresh(self.fetched, LOGS, lambda: found_logs(places, opened))
+        self.call_after_refresh(self.fetched, LOGS, lambda: found_logs(places, opened, with_recent=is_usual))
 
     def take(self, question: str, answer: object) -> None:
         if question == LOGS and isinstance(answer, list):

@@ -60,7 +60,7 @@ def test_defaults_are_those_that_the_reference_was_driven_with(name: str, contro
 @pytest.mark.parametrize(("name", "controller"), PROFILES)
 def test_each_profile_is_of_one_controller_and_planner(name: str, controller: str) -> None:
     driven = parameters.read(STARTS / f"{controller}.yaml")
-    for key, text in load_profile(name).schema.plugins.items():
+    for key, (text, *_others) in load_profile(name).schema.plugins.items():
         node, _, parameter = key.partition(".")
         assert text in str(driven[node][parameter])
 

@@ -28,6 +28,12 @@ def test_a_change_of_the_cause_is_promised_and_a_run_as_driven_is_not(planted: P
     assert one.as_driven() < 0.1
 
 
+def test_a_change_away_from_the_reference_takes_no_cause_away(planted: Profile) -> None:
+    one = promise(planted, {SPEED: 0.95})
+    assert one.query.reference["speed"] == DEFAULTS["speed"]
+    assert odds(one, speed=1.6 if DEFAULTS["speed"] < 1.4 else 1.2) <= one.as_driven() + 0.01
+
+
 def test_a_failed_part_leaves_a_change_no_more_than_it_does_not_explain(planted: Profile) -> None:
     one = promise(planted, {SPEED: 0.5, MOTOR: 0.9})
     assert odds(one, speed=DEFAULTS["speed"]) <= 1.0 - one.failure.acts(MOTOR) + 1e-9
