@@ -56,6 +56,11 @@ def command(*words: str, note: str = "") -> str:
     return f"{line}  # {clean(note)}" if note else line
 
 
+def shortened(text: str, longest: int) -> str:
+    """The text, or as much of its beginning with a sign that it goes on."""
+    return text if len(text) <= longest else f"{text[: longest - 3].rstrip()}..."
+
+
 def listed(names: Sequence[str], last: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`; nothing of none."""
     return f" {last} ".join([", ".join(names[:-1]), *names[-1:]]) if len(names) > 1 else "".join(names)

@@ -9,6 +9,7 @@ from typing import Literal
 from care_core.application.case import Case, changes_of, decided, fixes, weighed_without
 from care_core.application.signals import Signal
 from care_core.configs.driven import as_number
+from care_core.diagnose.estimates import WORTH
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult
 from care_core.errors import CareError
 from care_core.records import Struct, field, replace
@@ -101,6 +102,11 @@ class Session(Struct, eq=False):
         """What explains the failure, the causes set aside left out and the others weighed anew."""
         return weighed_without(self.diagnosis, self.dismissed).hypotheses
 
+    def weighed_case(self) -> Case:
+        """The case as what was set aside leaves it; only asked for in the state `data`."""
+        assert self.case is not None
+        return replace(self.case, diagnosis=weighed_without(self.diagnosis, self.dismissed))
+
     def odds_unchanged(self) -> float | None:
         """Probability that the next run is without a fault as driven; None where that is not known."""
         return self.diagnosis.odds_as_driven if self.unchanged is None else self.unchanged.odds
@@ -145,16 +151,19 @@ class Session(Struct, eq=False):
         return () if self.fault is None else self.fault.causes
 
     def set_aside(self, option: str, reason: str) -> bool:
-        """Set a cause aside; True when that changed the fix: the best one without it is ticked, where there is one."""
+        """Set a cause aside; True when that changed the fix: the best one without it is ticked, where one is left that
+        is worth its change."""
         self.dismissed[option] = reason
         if option not in self.basket.ticked:
             return False
         self._before_aside[option] = dict(self.basket.ticked)
-        others = [changes_of(fix) for fix in fixes(self.diagnosis) if not set(changes_of(fix)) & set(self.dismissed)]
-        if others:
-            self.basket.load(others[0])
-        else:
-            self.basket.drop(option)
+        driven = self.diagnosis.odds_as_driven or 0.0
+        others = [
+            changes_of(fix)
+            for fix in fixes(self.diagnosis)
+            if not set(changes_of(fix)) & set(self.dismissed) and (fix.odds or 0.0) >= driven + WORTH.value
+        ]
+        self.basket.load(others[0] if others else {})
         return True
 
     def take_back(self, option: str) -> bool:

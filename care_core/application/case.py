@@ -406,7 +406,12 @@ def decided(diagnosis: Diagnosis, fix: Fix | None, dismissed: Mapping[str, str])
     from care_core.diagnose.records import Dismissal
 
     aside = tuple(Dismissal(option, reason) for option, reason in dismissed.items())
-    diagnosis = weighed_without(diagnosis, dismissed)
+    faults = tuple(
+        replace(fault, causes=tuple(cause for cause in fault.causes if cause.option.name not in dismissed))
+        for fault in diagnosis.faults
+    )
+    tell_more = tuple(one for one in diagnosis.tell_more if not any(name in one for name in dismissed))
+    diagnosis = replace(weighed_without(diagnosis, dismissed), faults=faults, tell_more=tell_more)
     if fix is None or not fix.changes:
         return replace(diagnosis, fix=None, alternatives=fixes(diagnosis), dismissed=aside)
     wanted = changes_of(fix)
@@ -440,8 +445,10 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     if advised is not None and dict(changes) == changes_of(advised) and (advised.shown_by or changes.keys() - options):
         return advised
     if strange := sorted(changes.keys() - options):
+        where = "at another value" if advised is not None and changes.keys() == set(strange) else "beside other changes"
         raise CareError(
-            f"What {', '.join(strange)} does beside other changes is not known.", hint="Tick it alone, or untick it."
+            f"What {', '.join(strange)} does {where} is not known: no profile models it.",
+            hint="Take the suggestion (s), or untick it.",
         )
     answer = replace(case.reading.question, failure=case.diagnosis.failure).ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}

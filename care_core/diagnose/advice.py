@@ -188,7 +188,8 @@ def by_chance(fix: Fix, now: float, odds: float) -> str | None:
     if odds >= CHANCY.value:
         return None
     runs = MOST_RUNS + 1 if fix.p_fixed <= now else math.ceil(math.log(TOLD_APART) / math.log(fix.p_fixed / now))
-    to_know = f"run it {runs} times to know" if runs <= MOST_RUNS else "no few runs tell whether it helped"
+    times = "once" if runs == 1 else f"{runs} times"
+    to_know = f"run it {times} to know" if runs <= MOST_RUNS else "no few runs tell whether it helped"
     return (
         f"such missions fail by chance too, {_in_five(odds)} with the reference settings: this configuration fails "
         f"{_in_five(now)}, with the change {_in_five(fix.p_fixed)}; {to_know}"
@@ -199,7 +200,8 @@ def _in_five(odds: float) -> str:
     """Failures in a few missions, in words that nobody takes for more than they are."""
     lost = 1.0 - odds
     few = min(range(2, 11), key=lambda n: abs(round(lost * n) / n - lost) + 0.005 * n)
-    return f"{round(lost * few)} in {few}"
+    count = round(lost * few)
+    return "nearly always" if count == few else "hardly ever" if count == 0 else f"{count} in {few}"
 
 
 def _reached(fix: Fix, result: ObjectiveResult) -> str:

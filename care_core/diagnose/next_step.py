@@ -107,4 +107,5 @@ def _looked_at(name: str, diagnosis: Diagnosis) -> str:
     suspect = next((one for one in diagnosis.outside if one.name == name), None)
     is_chosen = suspect is not None and suspect.role in ("choice", "wiring")
     back = f"; 'param set {name} {shown(suspect.back)}' puts it back" if suspect is not None and is_chosen else ""
-    return f"check whether {name}{value} is right for this vehicle{back}"
+    robot = "robot" if format_named(diagnosis.run.log.format).ecosystem == "ros" else "vehicle"
+    return f"check whether {name}{value} is right for this {robot}{back}"

@@ -73,6 +73,9 @@ def _load(path: Path) -> Any:
     try:
         return _json(text) if text.lstrip().startswith("{") else plain_yaml.load(text)
     except (ValueError, RecursionError) as err:
+        if path.suffix.casefold() not in (".yaml", ".yml", ".json"):
+            hint = "Give the one in YAML or JSON: 'care triage LOG --out report.yaml' writes it."
+            raise ConfigError("A report in this format is for people to read.", hint=hint, where=str(path)) from err
         detail = " ".join(str(err).split())[:120]
         raise ConfigError(f"The report cannot be read: {detail}.", hint="Write it again.", where=str(path)) from err
 

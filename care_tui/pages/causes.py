@@ -79,6 +79,10 @@ class CausesPage(DiagnosisPage):
             yield side
         yield Reader(self.glyphs, id="text")
 
+    def enter(self) -> None:
+        if self.has_content and self.session.fault is None:
+            self.session.first_fault()  # of an objective that was kept, or not evaluated, there are no causes
+
     def view_of_diagnosis(self) -> View:
         ranked = self.ranked()
         listing = Listing(len(ranked), lambda i, width: self._item(ranked[i], width), lambda i: f"{ranked[i].name}")
@@ -271,6 +275,9 @@ class CausesPage(DiagnosisPage):
 
     def action_fold(self) -> None:
         """Open or close the statistics."""
+        if self.option_name() is None:
+            self.say("Training knows nothing of this: there are no statistics.")
+            return
         self._is_open = not self._is_open
         self.show_text(from_top=False)
         if self._is_open:
@@ -287,6 +294,7 @@ class CausesPage(DiagnosisPage):
         """Set the cause under the cursor aside, or take it back."""
         option = self.option_name()
         if option is None:
+            self.say("Only a parameter of the profile can be set aside.")
             return
         if option in self.session.dismissed:
             self._wanted = option

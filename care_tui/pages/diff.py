@@ -41,13 +41,14 @@ class DiffPage(DiagnosisPage):
     NAME = "diff"
     NOTHING = "nothing is to be changed"
     HELP = (
-        "Lines with - are what is, lines with + what is suggested. f compares with your own file, which it asks for; A "
-        "puts the change into that file: comments stay, the old one is kept beside. c copies the diff. Enter goes to "
-        "the report. Nothing is written to the robot."
+        "Lines with - are what is, lines with + what is suggested. f compares with your own file, which it asks for, F "
+        "with another; A puts the change into that file: comments stay, the old one is kept beside. c copies the diff. "
+        "Enter goes to the report. Nothing is written to the robot."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Report"),
         Binding("f", "other_side", "My file", id="diff.side"),
+        Binding("F", "other_file", "Other file", show=False, id="diff.file"),
         Binding("A", "apply", "Apply to it", id="diff.apply"),
         Binding("c", "copy_diff", "Copy", id="diff.copy"),
     ]
@@ -61,13 +62,15 @@ class DiffPage(DiagnosisPage):
         if self.session.only_asked:
             return
         engine, decided = self.workspace.engine, self.session.decided()
+        # A file that the change was put into is not what the robot ran, as it should be.
+        is_done = any(str(name).endswith(str(file)) for file in self.workspace.written for name in case.configs)
         commands = engine.commands if side == "driven" else lambda _diagnosis: []
         self.fetched(
             DIFF,
             lambda: (
                 engine.diff(case, fix, side),
                 commands(decided),
-                engine.doubts(case, fix) if side == "file" else (),
+                engine.doubts(case, fix) if side == "file" and not is_done else (),
             ),
         )
 
@@ -106,6 +109,10 @@ class DiffPage(DiagnosisPage):
             return
         sides = list(SIDES)
         self._turn(sides[(sides.index(self.side) + 1) % len(sides)])
+
+    def action_other_file(self) -> None:
+        """Name another file than the one before."""
+        self._ask_for_file()
 
     def _turn(self, side: DiffSide) -> None:
         self.side = side

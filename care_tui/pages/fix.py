@@ -196,9 +196,15 @@ class FixPage(DiagnosisPage):
 
     def action_suggestion(self) -> None:
         """Load the suggested fix."""
-        if self.session.diagnosis.fix is not None:
-            self.session.basket.load(changes_of(self.session.diagnosis.fix))
-            self.post_message(Decided())
+        suggested = self.session.diagnosis.fix
+        if suggested is None:
+            return
+        aside = sorted(changes_of(suggested).keys() & self.session.dismissed.keys())
+        if aside:
+            self.say(f"The suggestion changes {', '.join(aside)}, which was set aside.")
+            return
+        self.session.basket.load(changes_of(suggested))
+        self.post_message(Decided())
 
     def action_undo(self) -> None:
         """Take back the last change of the basket."""

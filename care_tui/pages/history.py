@@ -94,7 +94,8 @@ class HistoryPage(Page):
         if past.cause:
             rows.append(labelled("Cause", past.cause))
         until = [run for run in reversed(runs[index:]) if run.profile == past.profile]
-        rows += [Row(Content()), _columns("Objective", "this run", f"{len(until)} runs up to it", "bold")]
+        up_to_it = f"{len(until)} run{'' if len(until) == 1 else 's'} up to it"
+        rows += [Row(Content()), _columns("Objective", "this run", up_to_it, "bold")]
         for name, value in past.values.items():
             rows.append(_columns(name, _shown(value), self._trend([run.values.get(name) for run in until])))
         return rows

@@ -58,7 +58,10 @@ class MissionsPage(Page):
         if index is None:
             return Rows([])
         verdict = self._diagnosis.missions[index]
-        rows = [Row(objective_item(result, NAME_WIDTH, self.glyphs), 2) for result in verdict.results]
+        rows = [
+            Row(objective_item(result, NAME_WIDTH, self.glyphs, self.reader.room.width), 2)
+            for result in verdict.results
+        ]
         cut = warning("Mission", "the log stops before the mission does")
         return Rows(rows if verdict.mission.ended else [cut, *rows])
 

@@ -54,7 +54,7 @@ class ObjectivesPage(DiagnosisPage):
         width = min(max(len(clean(result.variable.name)) for result in results), NAME_WIDTH)
         listing = Listing(
             len(results),
-            lambda i, _width: (objective_item(results[i], width, glyphs, is_mine=results[i].name in mine),),
+            lambda i, room: (objective_item(results[i], width, glyphs, room, is_mine=results[i].name in mine),),
             lambda i: results[i].variable.name,
         )
         title = Content(f"Objectives: {counted(results)}")

@@ -74,7 +74,8 @@ def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: b
     if diagnosis.abstained:
         yield _labelled("Change") + text(f"none advised: {diagnosis.abstained}", "$text-warning")
     elif change is None and diagnosis.faults and not is_low:
-        yield _labelled("Change") + Content("none is known that helps")
+        is_left = diagnosis.fix is not None
+        yield _labelled("Change") + Content("nothing is ticked (4)" if is_left else "none is known that helps")
 
 
 def _change(session: Session, glyphs: Glyphs, width: int) -> Content | None:

@@ -32,6 +32,8 @@ STATUS_WIDTH = 17
 VALUE_WIDTH = 11
 BOUND_WIDTH = 12
 STRIP_WIDTH = 42
+SHORTEST_REASON = 12
+"""Cells below which the beginning of a reason tells nothing; it stands below in full."""
 
 
 def counted(results: Sequence[ObjectiveResult]) -> str:
@@ -41,20 +43,21 @@ def counted(results: Sequence[ObjectiveResult]) -> str:
     return f"{faults} outside, {statuses.count('ok')} within, {unknown} not evaluated"
 
 
-def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs, *, is_mine: bool = False) -> Content:
-    """One objective on one line: status, name padded to `width`, value, threshold, whose limit it is."""
+def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs, room: int, *, is_mine: bool = False) -> Content:
+    """One objective on one line: status, name padded to `width`, value, threshold, whose limit it is; why, where that
+    much of it has room that it tells anything."""
     variable, bound = result.variable, result.threshold
     wanted = "no threshold" if bound is None else f"{bound} {variable.unit}".rstrip()
     if result.value is None and result.need is not None:
         wanted = ""  # made for a mission that was not flown, or not to its end
-    return Content.assemble(
+    line = Content.assemble(
         status(result.status, glyphs).pad_right(STATUS_WIDTH - len(STATUS_WORDS[result.status]) - 2),
         padded(variable.name, width + 2, "bold"),
         padded("" if result.value is None else measure(result.value, variable.unit), VALUE_WIDTH),
         padded(wanted, BOUND_WIDTH),
         ("mine  " if is_mine else "", "bold $text-accent"),
-        text(result.reason, "dim"),
     )
+    return line + text(result.reason, "dim") if room - line.cell_length >= SHORTEST_REASON else line
 
 
 def objective_detail(result: ObjectiveResult, summary: Summary | None, glyphs: Glyphs) -> list[Row]:

@@ -393,7 +393,7 @@ class CaseScreen(Screen[None]):
         session, engine = self.session, self.workspace.engine
         if event.has_changed_fix and session.case is not None:
             session.fix = session.fix_error = None
-            changes, case = dict(session.basket.ticked), session.case
+            changes, case = dict(session.basket.ticked), session.weighed_case()
             self.workers.cancel_group(self, PREDICTION)
             self.run_worker(lambda: self._predict(lambda: engine.predict(case, changes)), group=PREDICTION, thread=True)
         with self.app.batch_update():

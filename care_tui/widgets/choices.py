@@ -12,7 +12,7 @@ from textual.geometry import Size
 from textual.message import Message
 
 from care_core.records import Record
-from care_tui.render.rows import Glyphs, cut
+from care_tui.render.rows import Glyphs, cut, text
 from care_tui.widgets.pane import MARGIN, Pane
 
 
@@ -111,13 +111,19 @@ class Choices(Pane):
     # As a pane
 
     @property
+    def _matches_nothing(self) -> bool:
+        return bool(self._filter and self.listing.count and not self._shown)
+
+    @property
     def line_count(self) -> int:
-        return len(self._shown) * self.listing.height
+        return 1 if self._matches_nothing else len(self._shown) * self.listing.height
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
         return self.line_count
 
     def line(self, place: int) -> Content:
+        if self._matches_nothing:
+            return cut(text(f" nothing here holds '{self._filter}'", "dim"), self.room.width, self.glyphs)
         item, part = divmod(place, self.listing.height)
         width = self.room.width - 1
         line = self.listing.item(self._shown[item], width)[part]

@@ -14,6 +14,7 @@ from care_core.files import bundled
 from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.pages.history import HistoryPage
+from care_tui.places import remember
 from care_tui.render.plot import dots_across, plot
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
@@ -201,10 +202,12 @@ async def test_the_change_is_put_into_the_file_that_is_asked_for_and_the_old_one
 async def test_a_folder_lists_its_logs_with_verdicts_and_enter_opens_one(tmp_path: Path) -> None:
     (tmp_path / "flight.BIN").write_bytes(SAMPLE.read_bytes())
     (tmp_path / "broken.BIN").write_bytes(b"x" * 100)
+    remember(SAMPLE)
     app = CareApp(Request(tmp_path, top=10), settings=Settings(places=()))
     async with app.run_test(size=(120, 40)) as pilot:
         await settle(pilot)
         assert walk(app).here == "logs"
+        assert title(app).startswith("2 logs in "), "none that was opened elsewhere"
         told = {line.split()[-1] if "UNREADABLE" in line else "flight": line for line in items(app).splitlines()}
         assert any("FAULT" in line and "mission_time" in line for line in told.values())
         assert any("UNREADABLE" in line for line in told.values())

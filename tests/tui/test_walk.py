@@ -181,6 +181,54 @@ async def test_a_cause_that_was_in_no_fix_comes_back_without_being_ticked(make_a
         assert walk(app).session.basket.ticked == {"LAND_SPEED": 50.0}, "ticked by hand meanwhile: it stays"
 
 
+async def test_a_cause_set_aside_takes_what_brings_nothing_out_of_the_fix(make_app: MakeApp) -> None:
+    weak = replace(sample.OTHER_FIX, changes=sample.OTHER_FIX.changes[1:], p_fixed=0.03)
+    steps = ("when the cause goes nothing is left", "and its own text")
+    made = replace(sample.faulty(), alternatives=(weak,), odds_as_driven=0.02, tell_more=("change LAND_SPEED", *steps))
+    app = make_app(made)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3", "d", *"as agreed", "enter")
+        assert walk(app).session.basket.ticked == {}, "3 % where 2 % was is worth no change"
+        assert "nothing is ticked" in answer(app)
+        await settle(pilot, "4", "s")
+        assert walk(app).session.basket.ticked == {}
+        assert "LAND_SPEED, which was set aside" in hints(app)
+        decided = walk(app).session.decided()
+        assert decided.tell_more == steps
+        assert "LAND_SPEED" not in [cause.option.name for fault in decided.faults for cause in fault.causes]
+
+
+async def test_what_has_no_statistics_and_what_nothing_matches_is_said(make_app: MakeApp) -> None:
+    app = make_app(sample.crashed())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        page = walk(app).page
+        while page.option_name() is not None:  # type: ignore[attr-defined]
+            await settle(pilot, "j")
+        await settle(pilot, "d")
+        assert "Only a parameter of the profile can be set aside" in hints(app)
+        await settle(pilot, "z")
+        assert "there are no statistics" in hints(app)
+        await settle(pilot, "1", "slash", *"zzz")
+        assert walk(app).page.choices.line_count == 1
+        assert "nothing here holds 'zzz'" in walk(app).page.choices.line(0).plain
+
+
+async def test_another_file_can_be_named_than_the_one_before(make_app: MakeApp, tmp_path: Path) -> None:
+    first, second = tmp_path / "first.parm", tmp_path / "second.parm"
+    for file in (first, second):
+        file.write_text("LAND_SPEED,16\n", encoding="utf-8")
+    app = make_app(sample.faulty(), configs=(first,))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "5", "F")
+        assert isinstance(app.screen, Prompt)
+        app.screen.dismiss(str(second))
+        await settle(pilot)
+        case = walk(app).session.case
+        assert case is not None
+        assert case.configs == (str(second),)
+
+
 async def test_the_boxes_decide_the_probability_and_what_diff_and_report_hold(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:

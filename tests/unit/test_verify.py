@@ -329,6 +329,15 @@ def test_odds_that_were_not_measured_promise_nothing(care: Care, report: Path) -
     assert document["p_fixed"] is None
 
 
+def test_a_report_for_people_is_told_from_one_for_programs(care: Care, tmp_path: Path) -> None:
+    told = tmp_path / "report.md"
+    care("triage", SAMPLE, "--out", told)
+    code, _, err = care("verify", told, SAMPLE)
+    assert code == 2
+    assert "is for people to read" in err
+    assert "--out report.yaml" in err
+
+
 def test_a_run_is_judged_against_the_reference_of_the_triage(care: Care, report: Path, tmp_path: Path) -> None:
     """Who vouches for a slow landing is wanted no faster a mission, then and afterwards."""
     slow = tmp_path / "ours.param"

@@ -15,6 +15,7 @@ from care_core.ecosystems.ros.messages import CLOUD, GOALS, ODOMETRY, ROSOUT, SC
 from care_core.ecosystems.ros.motion import stretches
 from care_core.ecosystems.ros.sensors import Scans
 from care_core.numbers import Floats, median, quantile
+from care_core.text import shortened
 
 LIMITS = Limits()
 _FROZEN = "a laser's noise never repeats while the robot moves"
@@ -74,7 +75,7 @@ def _finding(
 
 def _dead(drive: Drive, topic: str, last_s: float, period_s: float) -> Finding:
     complaint = next((message for message in drive.log_messages if _BUFFER.search(message.text)), None)
-    words = f'; {complaint.node}: "{complaint.text[:80]}"' if complaint is not None else ""
+    words = f'; {complaint.node}: "{shortened(complaint.text, 80)}"' if complaint is not None else ""
     evidence = f"no scan for the last {drive.duration_s - last_s:.0f} s, one every {period_s:.2g} s before{words}"
     return _finding(drive, f"the laser falls silent: {topic} ends", (last_s, drive.duration_s), evidence, topic)
 

@@ -215,7 +215,7 @@ def _answers(drive: Drive, held: Held) -> Iterator[Finding]:
     settings = [one for keys, one in held.items() if keys[-2:] == ("bt_navigator", "default_server_timeout")]
     short = [one for one in settings if not isinstance(one.value, str) and float(one.value) <= ANSWER_MS]
     last, server = lost[-1]
-    evidence = f"{len(unanswered)} waits for an answer ran out"
+    evidence = f"{len(unanswered)} wait{'' if len(unanswered) == 1 else 's'} for an answer ran out"
     if short:
         yield _finding(
             drive, "software", short, f"{server} did not answer in so many ms, and the goal was given up",

@@ -21,6 +21,7 @@ from care_core.ecosystems.ros.motion import (
     stretches,
 )
 from care_core.ecosystems.ros.node_messages import Level, LogMessage
+from care_core.text import shortened
 
 FAILS = re.compile(
     r"failed to (produce|find|get|make|create|generate) .*(path|plan|control)|failed to make progress"
@@ -81,7 +82,7 @@ def _fails(drive: Drive, complaints: list[LogMessage], kind: FindingKind, title:
         onset_s=at,
         end_s=complaints[-1].time_s,
         severity=drive.severity(at),
-        evidence=f'{len(complaints)} {often} "{text[:90]}"',
+        evidence=f'{len(complaints)} {often} "{shortened(text, 90)}"',
         source=f"{complaints[0].node} in /rosout",
         suspect="parameter",
         probability=0.4,

@@ -15,6 +15,7 @@ from care_core.ecosystems.ros.messages import GOALS, ROSOUT, STAMPED, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, control_rate, kept_its_rate
 from care_core.ecosystems.timeline import counted
 from care_core.numbers import median
+from care_core.text import shortened
 
 LIMITS = Limits()
 SHARE = LIMITS.add("messages a second", 0.1, "1/s", "loops that miss now and then are no fault")
@@ -66,7 +67,7 @@ def find(drive: Drive) -> Iterator[Finding]:
             onset_s=first.time_s,
             end_s=complaints[-1].time_s,
             severity="info" if kind == "control" else _at_most_warning(drive, first.time_s),
-            evidence=f'{len(complaints)} messages from {first.node}, first "{first.text[:90]}"',
+            evidence=f'{len(complaints)} messages from {first.node}, first "{shortened(first.text, 90)}"',
             source="/rosout",
             suspect="parameter",
             probability=0.3,

@@ -26,6 +26,7 @@ from care_core.ecosystems.ros.messages import (
 from care_core.ecosystems.ros.node_messages import Level
 from care_core.logs.recording import RENAMED
 from care_core.numbers import Floats, median
+from care_core.text import shortened
 
 LIMITS = Limits()
 _LOADED = "of 301 healthy missions, some recorded by a computer at its limit, the longest pause of odometry was 4.5 s"
@@ -71,7 +72,7 @@ def _qos(drive: Drive) -> Iterator[Finding]:
             onset_s=at,
             end_s=at,
             severity="warning" if empty else "info",
-            evidence=f'{what}; {node}: "{text[:160]}"',
+            evidence=f'{what}; {node}: "{shortened(text, 160)}"',
             source="/rosout; a subscriber that asks for reliable gets nothing from a best-effort publisher (ROS 2,"
             " About QoS)",
             suspect="operation",
