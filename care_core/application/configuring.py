@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 DiffSide = Literal["driven", "file", "changed"]
 
 _HEAD_BYTES = 4096
+_WHOLE = 100
+"""Parameters from which a file is one of a whole vehicle."""
 
 
 def side_of(name: str) -> Side:
@@ -213,7 +215,26 @@ def doubts_of(case: Case, fix: Fix) -> tuple[str, ...]:
     others = len(_file_against_driven(case).splitlines())
     if others:
         notes.append(f"{others} parameters of the file are not what the robot ran")
-    return tuple(dict.fromkeys(notes))
+    return tuple(dict.fromkeys((*_of_other_vehicles(case), *notes)))
+
+
+def _of_other_vehicles(case: Case) -> Iterator[str]:
+    """Files that by their parameters, or by what was calibrated, are those of another vehicle than the log's."""
+    from care_core.configs.loading import read_configs
+    from care_core.configs.same_vehicle import may_be_same_vehicle
+    from care_core.logs.formats import format_named
+
+    run = case.diagnosis.run
+    if format_named(run.log.format).ecosystem == "ros":
+        return  # a file of ROS may hold any part of a robot
+    driven = {name: setting.value for name, setting in run.settings.items()}
+    for file in read_configs(case.configs):
+        held = {name: setting.value for name, setting in file.settings.items()}
+        known = sum(name in driven for name in held)
+        if len(held) >= _WHOLE and known < len(held) / 2:
+            yield f"{file.path}: the log has {known} of its {len(held)} parameters: it is another vehicle's file"
+        elif not may_be_same_vehicle(held, driven):
+            yield f"{file.path}: by its sensors, calibration or settings it is another vehicle's file"
 
 
 def apply_to_files(case: Case, fix: Fix) -> list[tuple[Path, Path]]:

@@ -11,6 +11,7 @@ from typing import Literal, TypeGuard, get_args
 from care_core.files import read_small_text
 from care_core.metadata.fact import Fact, FactType, number
 from care_core.metadata.words import word_of
+from care_core.records import Record
 
 Ros = Literal["ros1", "ros2"]
 
@@ -24,12 +25,24 @@ STACKS: Mapping[Ros, str] = {
     "ros1": "the sources of ros-planning/navigation and teb_local_planner, indigo to noetic",
     "ros2": "the sources of ros-navigation/navigation2, foxy to rolling",
 }
-MENDED: Mapping[str, FactType] = {
-    "default_server_timeout": "int", "expected_update_rate": "float", "transform_tolerance": "float",
-    "use_sim_time": "bool",
-}  # fmt: skip
-"""Parameters whose right value a recording shows, by the last part of their names, with their types: a finding may ask
-for a change of them, and a report may make it, whatever profile is theirs."""
+
+
+class Mended(Record):
+    """A parameter whose right value a recording shows: a finding may ask for a change of it, and a report may make it,
+    whatever profile is theirs. `restart`: it is read only while its node is configured."""
+
+    type: FactType
+    unit: str = ""
+    restart: bool = False
+
+
+_MENDED: Mapping[str, Mended] = {
+    "default_server_timeout": Mended("int", "ms", restart=True),
+    "expected_update_rate": Mended("float", "s", restart=True),
+    "transform_tolerance": Mended("float", "s"),
+    "use_sim_time": Mended("bool"),
+}
+"""By the last part of their names; `nav2_behavior_tree` and `nav2_costmap_2d` say when they are read."""
 EVERY_NODE = "*"
 _GENERAL = re.compile(r"(use_sim_time|qos_overrides|bond_|diagnostic_updater|start_type_description)")
 _LOADING = frozenset({"plugin", "class"})
@@ -38,9 +51,9 @@ _WORD = re.compile(r"[a-z]+")
 _COMMON = frozenset({"server", "plugin", "parameters", "layer", "ros", "base"})
 
 
-def mended(name: str) -> FactType:
-    """The type of a parameter that a recording can show the right value of; "" for any other."""
-    return MENDED.get(re.split(r"[/.]", name)[-1], "")
+def mended(name: str) -> Mended | None:
+    """What is known of a parameter that a recording can show the right value of; None of any other."""
+    return _MENDED.get(re.split(r"[/.]", name)[-1])
 
 
 def is_ros(stack: str) -> TypeGuard[Ros]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -11,6 +12,7 @@ from textual.content import Content
 from care_core.application.proof import Subject
 from care_core.records import replace
 from care_core.text import clean
+from care_core.variables import Threshold
 from care_tui.messages import Judge
 from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to, sentence
@@ -22,12 +24,17 @@ from care_tui.widgets.choices import Listing
 NAME_WIDTH = 18
 
 
-def _wrong(typed: str) -> str:
+def _wrong(bound: Threshold | None, typed: str) -> str:
     """Why this is no threshold; empty when it is one, or gives the profile's back."""
     try:
-        return "" if not typed or math.isfinite(float(typed)) else f"'{typed}' is no threshold."
+        limit = float(typed or 1.0)
     except ValueError:
         return f"'{typed}' is not a number."
+    if not math.isfinite(limit):
+        return f"'{typed}' is no threshold."
+    # Times, energies and errors are amounts.
+    is_beyond_reach = bound is not None and bound.op in ("<=", "<") and limit <= 0
+    return "No mission can keep a limit of 0 or less." if is_beyond_reach else ""
 
 
 class ObjectivesPage(DiagnosisPage):
@@ -105,7 +112,7 @@ class ObjectivesPage(DiagnosisPage):
         hint = f"A number{unit}; empty takes the profile's threshold again. Enter judges by it, Esc cancels."
         start = "" if bound is None else f"{bound.value:g}"
         sign = "" if bound is None else f" {bound.op}"
-        prompt = Prompt(f"Judge {variable.name} by{sign}", start, hint, _wrong)
+        prompt = Prompt(f"Judge {variable.name} by{sign}", start, hint, partial(_wrong, bound))
         self.app.push_screen(prompt, lambda typed: self._typed(variable.name, typed))
 
     def _typed(self, objective: str, typed: str | None) -> None:

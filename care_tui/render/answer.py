@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from textual.content import Content
 
-from care_core.diagnose.records import Diagnosis
+from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.diagnose.verdict import hypothesis_text, verdict_of
 from care_core.ecosystems.findings import every_finding
 from care_core.text import clean
@@ -57,6 +57,7 @@ def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: b
     hypotheses = session.hypotheses()
     if hypotheses:
         first = hypotheses[0]
+        doubt = "  low confidence" if _is_doubtful(diagnosis, first) else ""
         found = [one for one in every_finding(diagnosis.health.findings) if one.title == first.name]
         yield (
             _labelled("Cause")
@@ -64,6 +65,7 @@ def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: b
             + Content.assemble(
                 (f" {percent(first.probability):>5}  ", "bold"),
                 text(hypothesis_text(first, found, diagnosis.outside), "bold"),
+                (doubt, "$text-warning"),
             )
         )
     elif causes := [cause for fault in diagnosis.faults for cause in fault.causes if not cause.is_lead]:
@@ -76,6 +78,13 @@ def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: b
     elif change is None and diagnosis.faults and not is_low:
         is_left = diagnosis.fix is not None
         yield _labelled("Change") + Content("nothing is ticked (4)" if is_left else "none is known that helps")
+
+
+def _is_doubtful(diagnosis: Diagnosis, first: Hypothesis) -> bool:
+    """Whether training says too little of the parameter that leads to be relied on."""
+    causes = (cause for fault in diagnosis.faults for cause in fault.causes)
+    sure = [cause.confidence for cause in causes if cause.option.name == first.name]
+    return first.what == "parameter" and sure[:1] == ["low"]
 
 
 def _change(session: Session, glyphs: Glyphs, width: int) -> Content | None:

@@ -84,7 +84,8 @@ def outside_fix(one: Advisable, odds: float, run: Run, beside: Sequence[Change] 
     if one.wanted is None:
         raise ValueError(f"no value of {one.name} is known to be right")
     option = outside_option(one.name, one.wanted, vehicle_of_run(run))
-    notes = ("takes effect after a reboot",) if option.reboot_required else ()
+    again = "a reboot" if mended(one.name) is None else "a restart"
+    notes = (f"takes effect after {again}",) if option.reboot_required else ()
     return Fix((Change(option, one.value, one.wanted, notes), *beside), odds, {})
 
 
@@ -99,24 +100,25 @@ def shown_fix(lead: Advisable | None, run: Run) -> Fix | None:
 def outside_option(name: str, default: float | None, vehicle: Vehicle) -> Variable:
     """A parameter that no profile models, as an option: with what the firmware's documentation says of it."""
     fact = ardupilot.fact_of(name, vehicle.kind, vehicle.version)
-    meaning = meaning_of(name, vehicle.kind)
+    meaning, shown_by_logs = meaning_of(name, vehicle.kind), mended(name)
     return Variable(
         name=name,
         role=Role.OPTION,
         type=_type(name, fact),
-        unit="" if fact is None else fact.unit,
+        unit=fact.unit if fact is not None else shown_by_logs.unit if shown_by_logs is not None else "",
         doc="" if fact is None else fact.line,
         range=None if fact is None or fact.low is None or fact.high is None else (fact.low, fact.high),
         default=default,
         parameters=(name,),
-        reboot_required=fact is not None and fact.reboot,
+        reboot_required=any((fact is not None and fact.reboot, shown_by_logs is not None and shown_by_logs.restart)),
         safety=meaning is not None and meaning.role == "safety",
     )
 
 
 def _type(name: str, fact: Fact | None) -> ValueType:
-    if (known := mended(name)) in get_args(ValueType):
-        return cast(ValueType, known)
+    known = mended(name)
+    if known is not None and known.type in get_args(ValueType):
+        return cast(ValueType, known.type)
     is_code = fact is not None and bool(fact.values) and fact.low is None
     return "int" if is_code else "float"
 
