@@ -79,7 +79,11 @@ class ObjectiveResult(Record):
         if self.need is None or self.threshold is None or self.variable.relative is None:
             return ""
         need = f"{figures(self.need.value)} {self.variable.unit}".rstrip()
-        if self.threshold.value == self.variable.relative.at_least or self.variable.relative.ratio == 1:
+        least = self.variable.relative.at_least
+        if self.threshold.value == least and self.variable.relative.ratio != 1:
+            allowed = f"{least:g} {self.variable.unit}".rstrip()
+            return f"{allowed} is always allowed; the reference configuration needs {need} for this mission"
+        if self.threshold.value == least or self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
         if self.threshold != self.variable.relative.for_need(self.need.value):
             return (
