@@ -30,9 +30,9 @@ class FixPage(DiagnosisPage):
     HELP = (
         "Space ticks a change, + and - nudge its value, = types one. The odds follow at once, here and in the answer "
         "above, where they are of all objectives together and count that the cause may be another; those at a line are "
-        "of the next run if only this parameter is changed. a loads the next alternative, s the suggestion, u takes the "
-        "last change back. Every parameter of the profile is here: / finds it. Enter shows the diff. Nothing is written "
-        "to the robot."
+        "of the next run if only this parameter is changed. a loads the next alternative, s the suggestion, u takes "
+        "the last change back. Every parameter of the profile is here: / finds it. Enter shows the diff. Nothing is "
+        "written to the robot."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Diff"),
