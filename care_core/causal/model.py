@@ -167,6 +167,11 @@ class OutcomeRecord(Record, kw_only=True):
     mediation: Mediation | None = None
     """Of the one mechanism."""
 
+    @property
+    def mechanisms(self) -> tuple[str, ...]:
+        """Those that predict it, in order."""
+        return tuple(stage.mechanism for stage in self.stages) or (self.mechanism,)
+
 
 class SkillRecord(Record, kw_only=True):
     """How well the predicted probabilities of an objective fit runs that were held out."""

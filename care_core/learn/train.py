@@ -18,7 +18,7 @@ from care_core.causal.model import EdgeRecord, EffectRecord, Model, OutcomeRecor
 from care_core.causal.paths import CausalPath, Ways
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.bootstrap import support as measure_support
-from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
+from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, UNUSED, slopes
 from care_core.learn.identification import identify, is_answered_by
 from care_core.learn.knowledge import with_known
 from care_core.learn.mediation import with_mediation
@@ -93,7 +93,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, report:
     outcomes = with_mediation(outcomes, mechanisms, with_known(graph, frame, schema), frame, schema)
     training = _training(frame, schema, structure, settings)
     training = replace(training, carry_over=carry_over(frame, schema, outcomes, mechanisms))
-    learned = Learned(with_weak(graph, frame, schema), support, outcomes, mechanisms, training)
+    learned = Learned(with_weak(graph, frame, schema, (outcomes, mechanisms)), support, outcomes, mechanisms, training)
     return assemble(frame, schema, learned, settings, rng, report)
 
 
@@ -220,16 +220,26 @@ def _reweighted(mechanism: Mechanism, among: FloatArray, rows: NDArray[np.int64]
     return weights
 
 
-def with_weak(graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> CausalGraph:
-    """Where runs are few, the graph with an edge to every objective from each option that no path leads from."""
-    if len(frame) >= FEW_RUNS or schema.observational:
+def with_weak(graph: CausalGraph, frame: pd.DataFrame, schema: Schema, learned: Outcomes = ({}, {})) -> CausalGraph:
+    """The graph with an edge to every objective from each option that its mechanisms read and no path leads from, where
+    runs are few from every option."""
+    if schema.observational:
         return graph
-    weak = {
-        (option, objective)
-        for objective in varying(frame, [v.name for v in schema.objectives])
-        for option in varying_options(frame, schema)
-        if option not in graph.ancestors(objective)
-    }
+    options = varying_options(frame, schema)
+    read = dict.fromkeys(varying(frame, [v.name for v in schema.objectives]), options)
+    if len(frame) >= FEW_RUNS:
+        outcomes, mechanisms = learned
+        used = {
+            key: {
+                one.inputs[place] for place, slope in zip(one.reads, slopes(one.kernel), strict=True) if slope > UNUSED
+            }
+            for key, one in mechanisms.items()
+        }
+        read = {
+            name: tuple(option for option in options if any(option in used[key] for key in one.mechanisms))
+            for name, one in outcomes.items()
+        }
+    weak = {(option, name) for name, from_ in read.items() for option in from_ if option not in graph.ancestors(name)}
     return CausalGraph(graph.nodes, graph.directed | weak, graph.bidirected)
 
 

@@ -7,11 +7,12 @@ import pytest
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import Model
-from care_core.learn.fitting import Effort
+from care_core.learn.fitting import Effort, slopes
 from care_core.learn.outcomes import (
     FEW_RUNS,
     ask_total,
     causes_of,
+    chosen,
     find_stages,
     fit_on,
     fit_outcomes,
@@ -146,6 +147,44 @@ def test_among_few_runs_what_the_search_did_not_find_is_not_ruled_out() -> None:
     assert with_weak(GRAPH, frame, SMALL).directed == {*GRAPH.directed, ("gain", "time")}
     assert with_weak(bare, missions(), SMALL) == bare
     assert with_weak(bare, frame, replace(SMALL, observational=True)) == bare
+
+
+OPTIONS = [Variable(f"option{i}", Role.OPTION, range=(0.0, 1.0), default=0.5) for i in range(8)]
+WIDE = replace(SMALL, variables={**{v.name: v for v in OPTIONS}, **SMALL.variables})
+
+
+def wide_missions(n: int) -> pd.DataFrame:
+    """Seldom off the reference; the error answers to option7 alone, which no search found."""
+    rng = np.random.default_rng(1)
+    off = rng.random((n, len(OPTIONS))) < 0.25
+    values = np.where(off, rng.uniform(size=off.shape), 0.5)
+    table = pd.DataFrame(values, columns=[v.name for v in OPTIONS])
+    table["error"] = 1.0 + 2.0 * np.abs(table["option7"] - 0.5) + 0.05 * rng.standard_normal(n)
+    table["gain"], table["wind"] = rng.uniform(size=n), 0.0
+    table[["armed", "located", "success", "time"]] = np.nan
+    return table
+
+
+def test_among_many_runs_what_the_search_did_not_find_is_read_where_runs_left_out_say_so() -> None:
+    graph = CausalGraph(tuple(WIDE.variables), frozenset({("option0", "error")}))
+    frame, effort = wide_missions(FEW_RUNS + 50), replace(QUICK, folds=3)
+    found = fit_total("error", frame, WIDE, graph, np.random.default_rng(0), effort=effort)
+    assert found is not None
+    moves = {found.inputs[place] for place, slope in zip(found.reads, slopes(found.kernel), strict=True) if slope > 0.2}
+    assert "option7" in moves
+    bare = CausalGraph(tuple(WIDE.variables))
+    assert fit_total("error", frame, WIDE, bare, np.random.default_rng(0), effort=effort) is None, "of many runs"
+
+
+def test_all_options_are_taken_where_that_is_no_worse_by_more_than_chance() -> None:
+    rng = np.random.default_rng(0)
+    best = rng.normal(size=400)
+    near, far = best + rng.normal(0.005, 0.2, size=400), best + rng.normal(0.1, 0.2, size=400)
+    assert chosen([best, near], [False, True]) == 1
+    assert chosen([best, far], [False, True]) == 0
+    assert chosen([best, near], [False, False]) == 0
+    assert chosen([near, best], [True, True]) == 1
+    assert chosen([np.full(400, np.nan), near], [True, False]) == 1
 
 
 def test_contexts_are_read_only_where_operators_chose_by_them() -> None:

@@ -102,7 +102,7 @@ def test_runs_of_the_same_robot_hardly_move_it(planted: Profile, runs: int) -> N
     test, few = fly_many(150, seed=7), fly_many(runs, seed=8)
     _, mechanisms = carry_over(planted.model, SCHEMA, few, planted.model.graph, np.random.default_rng(0))
     for name in ("time", "energy"):
-        assert error(mechanisms, test, name) < 1.1 * error(planted.model.mechanisms, test, name)
+        assert error(mechanisms, test, name) < 1.15 * error(planted.model.mechanisms, test, name)
 
 
 def test_with_few_runs_the_source_keeps_its_graph_and_its_support(planted: Profile, tmp_path: Path) -> None:
