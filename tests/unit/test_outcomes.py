@@ -158,7 +158,7 @@ def wide_missions(n: int) -> pd.DataFrame:
     rng = np.random.default_rng(1)
     off = rng.random((n, len(OPTIONS))) < 0.25
     values = np.where(off, rng.uniform(size=off.shape), 0.5)
-    table = pd.DataFrame(values, columns=[v.name for v in OPTIONS])
+    table: pd.DataFrame = pd.DataFrame(values, columns=[v.name for v in OPTIONS])
     table["error"] = 1.0 + 2.0 * np.abs(table["option7"] - 0.5) + 0.05 * rng.standard_normal(n)
     table["gain"], table["wind"] = rng.uniform(size=n), 0.0
     table[["armed", "located", "success", "time"]] = np.nan
