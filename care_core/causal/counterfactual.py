@@ -22,11 +22,11 @@ from care_core.causal.abduction import (
     next_passes,
     next_value,
 )
+from care_core.causal.all_objectives import AllObjectives
 from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import LEAST, TAIL, Mechanism, Posterior, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_CARRY_OVER, Mediation, Model, NoiseCarryOver, OutcomeRecord, StageRecord
 from care_core.causal.posteriors import PosteriorCache
-from care_core.causal.together import Together
 from care_core.constraints import Constraint
 from care_core.records import Record, field, replace
 from care_core.run import is_known
@@ -117,15 +117,15 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         """
         base = float(np.prod(list(self.base_rates().values())))
         kept = self.all_kept(list(self.model.outcomes), configs)
-        return np.full(len(configs), base) if kept is None else base * self._together.of_product(kept)
+        return np.full(len(configs), base) if kept is None else base * self._all_objectives.of_product(kept)
 
     @cached_property
-    def _together(self) -> Together:
+    def _all_objectives(self) -> AllObjectives:
         """What to make of the product of the single probabilities: as it is where other objectives are asked about
         than those of the runs that were left out."""
         held_out = self.model.skill.get("all")
         is_all = self.model.outcomes.keys() <= self.thresholds.keys()
-        return Together.of(held_out.curve) if held_out is not None and is_all else Together()
+        return AllObjectives.of(held_out.curve) if held_out is not None and is_all else AllObjectives()
 
     def all_kept(self, objectives: Sequence[str], configs: Sequence[Config]) -> FloatArray | None:
         """Probability that each of these keeps its threshold, shape (m,), those that move together counted once; None

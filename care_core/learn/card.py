@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from care_core.causal.all_objectives import AllObjectives
 from care_core.causal.model import UNKNOWN_CARRY_OVER, EffectRecord, Model, SkillRecord
-from care_core.causal.together import Together
 from care_core.files import read_small_text
 from care_core.learn.identification import identify
 from care_core.metadata.causal_map import meaning_of
@@ -150,7 +150,7 @@ def _curve(skill: SkillRecord) -> str:
     """The calibration curve as a table with bars."""
     rows = ((f"{p:.2f}", f"{met:.2f}", f"{n}", f"`{_bar(p)}`<br>`{_bar(met)}`") for p, met, n in skill.curve)
     header = ("predicted", "met", "runs", "predicted above, met below")
-    made = Together.of(skill.curve).of_product(np.array([0.5, 0.75, 0.9]))
+    made = AllObjectives.of(skill.curve).of_product(np.array([0.5, 0.75, 0.9]))
     said = ", ".join(f"{promised:.2f}" for promised in made)
     return (
         "\n\nCalibration of the probability that all objectives are met, as the product of the single ones:\n\n"

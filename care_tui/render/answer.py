@@ -111,11 +111,11 @@ def _change(session: Session, glyphs: Glyphs, width: int) -> Content | None:
     again = Content.styled("  unless it happens again", "$text-warning") if session.diagnosis.lost_by else Content()
     is_advised = not session.only_asked and not session.diagnosis.abstained
     head = _labelled("Change" if is_advised else "Asked") + odds + Content("  ")
-    tail = Content(more) + beside
-    room = width - head.cell_length - tail.cell_length
-    if room - again.cell_length >= _LEAST:  # else the page of the fix says it
-        room, tail = room - again.cell_length, tail + again
-    return head + _cut(Content.assemble(text(name, "bold"), " ", change), max(room, _LEAST), glyphs) + tail
+    what, room = Content.assemble(text(name, "bold"), " ", change), width - head.cell_length - len(more)
+    # Of what does not fit beside the change the page of the fix tells the rest.
+    tails = (beside + again, again or beside, beside)
+    tail = next((one for one in tails if what.cell_length + one.cell_length <= room), beside)
+    return head + _cut(what, max(room - tail.cell_length, _LEAST), glyphs) + more + tail
 
 
 def _limits(diagnosis: Diagnosis, *, is_low: bool) -> Iterator[Content]:

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from care_core.causal.all_objectives import AllObjectives
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import TAIL
 from care_core.causal.model import NoiseCarryOver
-from care_core.causal.together import Together
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.run import Unavailable
@@ -145,14 +145,14 @@ def test_runs_left_out_say_what_to_make_of_the_product_of_the_single_probabiliti
 def test_what_is_made_of_a_product_follows_the_runs_and_its_order(
     offset: float, slope: float, runs: int, shares: list[float]
 ) -> None:
-    truth = Together(offset, slope, best=1.0)
+    truth = AllObjectives(offset, slope, best=1.0)
     product = np.array(sorted(shares))
     met = truth.of_product(product)
-    found = Together.of(list(zip(product.tolist(), met.tolist(), [runs] * len(product), strict=True)))
+    found = AllObjectives.of(list(zip(product.tolist(), met.tolist(), [runs] * len(product), strict=True)))
     made = found.of_product(product)
     assert np.abs(made - met).max() <= 0.1
     assert (np.diff(made) >= 0).all()
-    assert Together.of(()).of_product(product) == pytest.approx(product)
+    assert AllObjectives.of(()).of_product(product) == pytest.approx(product)
 
 
 def test_an_objective_without_a_mechanism_counts_with_its_base_rate(planted: Profile) -> None:

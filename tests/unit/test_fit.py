@@ -29,8 +29,8 @@ def test_another_part_of_the_stack_does_not_fit(log_path: Path) -> None:
     log, schema = open_log(log_path), load_profile("nav2").schema
     named = next(name for name in log.settings() if name.endswith("xy_goal_tolerance"))
     own = str(log.settings()[named][0].value)
-    fits = fit_of(log, cover(log, replace(schema, plugins={named: own, PLUGIN: "DWB"})))
-    other = fit_of(log, cover(log, replace(schema, plugins={named: "MPPI"})))
+    fits = fit_of(log, cover(log, replace(schema, plugins={named: (own,), PLUGIN: ("NavFn", "DWB")})))
+    other = fit_of(log, cover(log, replace(schema, plugins={named: ("MPPI",)})))
     assert fits.verdict != "no"
     assert other.verdict == "no"
     assert f"{named} is {own}, the profile was learned with MPPI" in other.reasons
@@ -39,7 +39,7 @@ def test_another_part_of_the_stack_does_not_fit(log_path: Path) -> None:
 def test_a_profile_of_another_stack_does_not_stand_in_for_one_whose_controller_is_another(log_path: Path) -> None:
     log, nav2, husky = open_log(log_path), load_profile("nav2"), load_profile("husky")
     named = next(name for name in log.settings() if name.endswith("xy_goal_tolerance"))
-    other = replace(nav2, schema=replace(nav2.schema, plugins={named: "MPPI"}))
+    other = replace(nav2, schema=replace(nav2.schema, plugins={named: ("MPPI",)}))
     assert choose_profile(log, [husky])[0] is husky
     assert choose_profile(log, [husky, other])[0] is None
     (reason,) = choose_profile(log, [husky, other])[1].fit.reasons

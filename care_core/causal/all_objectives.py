@@ -23,7 +23,7 @@ _DOUBT = np.diag([1.0, 4.0])
 _STEPS = 20
 
 
-class Together(Record):
+class AllObjectives(Record):
     """Platt's logistic (1999) of the logit of the product of the single probabilities, as far as runs show it."""
 
     offset: float = 0.0
@@ -32,7 +32,7 @@ class Together(Record):
     """Share that met everything where most did: nothing more is made of a smaller product."""
 
     @classmethod
-    def of(cls, curve: Sequence[tuple[float, float, int]]) -> Together:
+    def of(cls, curve: Sequence[tuple[float, float, int]]) -> AllObjectives:
         """Fit to held-out runs: rows of the mean predicted probability, the share that met everything, and the runs."""
         if not curve:
             return cls()
