@@ -21,9 +21,9 @@ test sweep: export PYTHONDONTWRITEBYTECODE :=
 test: $(DEV)
 	$(BIN)/pytest -n 3 --dist worksteal
 
-# The same with everything that the tests take a sample of.
+# The same with everything that the tests take a sample of, and with new examples of what must hold for any.
 sweep: $(DEV)
-	CARE_WHOLE=1 CARE_DAMAGE=200 CARE_KILLS=200 $(BIN)/pytest -n 3 --dist worksteal
+	CARE_WHOLE=1 CARE_DAMAGE=200 CARE_KILLS=200 $(BIN)/pytest -n 3 --dist worksteal --hypothesis-profile=sweep
 
 check: $(DEV)
 	$(BIN)/ruff check .

@@ -18,9 +18,10 @@ from care_core.records import Record
 _NEAREST = 0.002
 """No held-out probability counts as nearer than this to 0 or 1."""
 _LEAST = 1e-12
+_BELIEVED = np.array([0.0, 1.0])
 _DOUBT = np.diag([1.0, 4.0])
-"""Precision of an offset of 0 and of a slope of 1, which is what is believed without runs."""
-_STEPS = 20
+"""Offset and slope that are believed without runs, and how firmly (precision)."""
+_STEPS, _NO_STEP = 50, 1e-9
 
 
 class AllObjectives(Record):
@@ -38,12 +39,22 @@ class AllObjectives(Record):
             return cls()
         predicted, share, runs = np.array(curve, dtype=float).T
         x = np.column_stack([np.ones(len(curve)), logit(predicted, _NEAREST)])
-        believed = np.array([0.0, 1.0])
-        theta = believed
+
+        def loss(theta: FloatArray) -> float:
+            odds, off = x @ theta, theta - _BELIEVED
+            return float((runs * (np.logaddexp(0.0, odds) - share * odds)).sum() + 0.5 * off @ _DOUBT @ off)
+
+        theta, least = _BELIEVED, loss(_BELIEVED)
         for _ in range(_STEPS):
             p = logistic(x @ theta)
-            gradient = x.T @ (runs * (share - p)) - _DOUBT @ (theta - believed)
-            theta = theta + np.linalg.solve((x.T * (runs * p * (1 - p))) @ x + _DOUBT, gradient)
+            gradient = x.T @ (runs * (share - p)) - _DOUBT @ (theta - _BELIEVED)
+            step = np.linalg.solve((x.T * (runs * p * (1 - p))) @ x + _DOUBT, gradient)
+            # A whole Newton step leads away from the best where the curve is flat.
+            while (now := loss(theta + step)) > least and np.abs(step).max() > _NO_STEP:
+                step = step / 2
+            if now >= least:
+                break
+            theta, least = theta + step, now
         best = float(((runs * share + 0.5) / (runs + 1.0)).max())
         return cls(float(theta[0]), max(float(theta[1]), 0.0), best)
 

@@ -283,6 +283,8 @@ class _Walk:
         follows = self._followed(over)
         # Where a topic's subscription is lost, its messages still hold the chain together.
         if follows and (is_sound or (kind == DATA and (follows == 2 or number[0] not in self._ids))):
+            if not (kind == DATA and is_sound) and self._holds_messages(pos + HEADER, over):
+                return self._leave(pos, self._resume(pos))
             self._take(pos, kind, over, number)
             return over
         resumed = self._resume(pos)
@@ -308,6 +310,23 @@ class _Walk:
         self._found.damage.append(Damage("the length of a record is wrong", pos))
         self._found.loose.append((pos, int(self._topic_of[number[0]])))
         return True
+
+    def _holds_messages(self, low: int, high: int) -> bool:
+        """Whether messages of declared topics fill what would be the rest of a record's body: garbage may begin as a
+        record does that ends where one of theirs does."""
+        body = self._bytes(low, high)
+        at = body.find(DATA, 2)
+        while at >= 0:
+            end = self._message_end(low + at - 2)
+            if end == high or (end and end < high and self._message_end(end)):
+                return True
+            at = body.find(DATA, at + 1)
+        return False
+
+    def _message_end(self, pos: int) -> int:
+        """The byte behind the message of a declared topic that begins at a byte, 0 where none does."""
+        length, kind, number = self._header(pos)
+        return pos + HEADER + length if kind == DATA and number in self._declared else 0
 
     def _followed(self, pos: int) -> int:
         """How sure it is that a record begins at a byte: 0 not, 1 several can follow each other from there, 2 one with

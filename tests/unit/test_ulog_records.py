@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from care_core import limits
@@ -106,6 +106,8 @@ def test_no_bytes_raise(garbage: bytes, at: int) -> None:
 
 
 @given(st.binary(min_size=1, max_size=300), st.integers(0, 39))
+@example(b"\xcc\x00L\x00", 0)  # a text of 204 bytes, which ends where the seventh message does
+@example(b"\xcc\x00D\x00", 0)
 @settings(max_examples=150, deadline=None)
 def test_what_stands_between_records_costs_none(garbage: bytes, at: int) -> None:
     rows = [message(700, START_US + row, struct.pack("<4f", *range(4))) for row in range(40)]
