@@ -6,6 +6,7 @@ The work is imported by the function that needs it: the app draws its first fram
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -410,7 +411,8 @@ def decided(diagnosis: Diagnosis, fix: Fix | None, dismissed: Mapping[str, str])
         replace(fault, causes=tuple(cause for cause in fault.causes if cause.option.name not in dismissed))
         for fault in diagnosis.faults
     )
-    tell_more = tuple(one for one in diagnosis.tell_more if not any(name in one for name in dismissed))
+    names = [re.compile(rf"\b{re.escape(name)}\b") for name in dismissed]
+    tell_more = tuple(one for one in diagnosis.tell_more if not any(name.search(one) for name in names))
     diagnosis = replace(weighed_without(diagnosis, dismissed), faults=faults, tell_more=tell_more)
     if fix is None or not fix.changes:
         return replace(diagnosis, fix=None, alternatives=fixes(diagnosis), dismissed=aside)

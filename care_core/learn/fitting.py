@@ -6,8 +6,8 @@ an input that explains nothing ends near zero and costs nothing, which is what m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -194,6 +194,14 @@ def drawn_folds(groups: NDArray[np.int64], effort: Effort, rng: np.random.Genera
     return tuple(Fold(own, drawn(int((~own).sum()), effort, rng)) for own in out)
 
 
+def _without_each(
+    folds: Sequence[Fold], x: FloatArray, y: FloatArray, groups: NDArray[np.int64], refit: Callable[..., Fitted]
+) -> Iterator[tuple[NDArray[np.bool_], Mechanism]]:
+    """The runs of each fold in turn, and the mechanism of those of the others that a fit keeps."""
+    for out, kept in folds:
+        yield out, refit(x[~out][kept], y[~out][kept], groups=groups[~out][kept]).mechanism
+
+
 def tested_on_runs_left_out(
     mechanism: Mechanism,
     x: FloatArray,
@@ -223,11 +231,10 @@ def tested_on_runs_left_out(
     if len(y) >= MANY_RUNS:  # half the steps from there end as near to the best as all from the middle would
         start, again = mechanism.kernel, replace(effort, iterations=effort.iterations // 2)
     errors = np.empty(len(y))
-    for out, kept in folds:
-        others = fit(
-            x[~out][kept], y[~out][kept], replace(inputs, read=read), binary=False, effort=again,
-            transform=mechanism.transform, groups=groups[~out][kept], start=start,
-        ).mechanism  # fmt: skip
+    refit = partial(
+        fit, inputs=replace(inputs, read=read), binary=False, effort=again, transform=mechanism.transform, start=start
+    )
+    for out, others in _without_each(folds, x, y, groups, refit):
         sd = np.sqrt(others.latent_sd(x[out]) ** 2 + others.noise_sd**2)
         errors[out] = (transformed(y[out], mechanism.transform) - others.latent(x[out])) / sd
     return replace(mechanism, calibration=residual_levels(errors))
@@ -253,9 +260,8 @@ def held_out(
     """
     again = replace(effort, iterations=effort.iterations // 2)
     latent, loss = np.empty(len(y)), np.empty(len(y))
-    for out, kept in folds:
-        known = x[~out][kept], y[~out][kept]
-        mechanism = fit(*known, inputs, binary=binary, effort=again, groups=groups[~out][kept]).mechanism
+    refit = partial(fit, inputs=inputs, binary=binary, effort=again)
+    for out, mechanism in _without_each(folds, x, y, groups, refit):
         there = mechanism.posterior(x[out])
         latent[out] = there.latent
         if binary:

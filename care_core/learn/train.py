@@ -220,7 +220,7 @@ def _reweighted(mechanism: Mechanism, among: FloatArray, rows: NDArray[np.int64]
     return weights
 
 
-def with_weak(graph: CausalGraph, frame: pd.DataFrame, schema: Schema, learned: Outcomes = ({}, {})) -> CausalGraph:
+def with_weak(graph: CausalGraph, frame: pd.DataFrame, schema: Schema, learned: Outcomes) -> CausalGraph:
     """The graph with an edge to every objective from each option that its mechanisms read and no path leads from, where
     runs are few from every option."""
     if schema.observational:

@@ -10,11 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_core.application.case import decided
 from care_core.errors import ConfigError, UsageError
+from care_core.records import replace
 from care_core.variables import Role, Variable
 from care_tui.basket import Basket, is_advisable, nudged, parsed, possible
 from care_tui.clipboard import MAX_BYTES, fits, osc52
 from care_tui.settings import Settings, load_settings, prepare_terminal, takes_only_ascii, with_flags
+from tests.made import made_diagnosis
 
 FLOAT = Variable("gain", Role.OPTION, "float", "", "", (0.01, 10.0), 1.0)
 INT = Variable("speed", Role.OPTION, "int", "cm/s", "", (30, 200), 50)
@@ -164,3 +167,9 @@ def test_ssh_gets_fewer_frames_unless_told_otherwise(monkeypatch: pytest.MonkeyP
     assert os.environ["NO_COLOR"] == "1"
     for name in ("TEXTUAL_FPS", "NO_COLOR", "TEXTUAL_COLOR_SYSTEM"):
         monkeypatch.setenv(name, "")
+
+
+def test_a_parameter_that_is_set_aside_takes_no_advice_about_another_along() -> None:
+    advice = ("change only gain to 1: it would settle it", "change only gain_up to 2: it would settle it")
+    made = replace(made_diagnosis(), tell_more=advice)
+    assert decided(made, made.fix, {"gain": "it is a spare"}).tell_more == advice[1:]

@@ -12,6 +12,7 @@ from care_core.learn.outcomes import (
     FEW_RUNS,
     ask_total,
     causes_of,
+    Outcomes,
     chosen,
     find_stages,
     fit_on,
@@ -142,11 +143,12 @@ def test_among_few_runs_what_the_search_did_not_find_is_not_ruled_out() -> None:
     assert found is not None
     low, high = found.expected(np.array([[0.1], [0.7]]))
     assert (low, high) == (pytest.approx(0.9, abs=0.1), pytest.approx(0.3, abs=0.1))
-    weak = with_weak(bare, frame, SMALL)
+    nothing: Outcomes = ({}, {})
+    weak = with_weak(bare, frame, SMALL, nothing)
     assert weak.directed == {("gain", "success"), ("gain", "time")}
-    assert with_weak(GRAPH, frame, SMALL).directed == {*GRAPH.directed, ("gain", "time")}
-    assert with_weak(bare, missions(), SMALL) == bare
-    assert with_weak(bare, frame, replace(SMALL, observational=True)) == bare
+    assert with_weak(GRAPH, frame, SMALL, nothing).directed == {*GRAPH.directed, ("gain", "time")}
+    assert with_weak(bare, missions(), SMALL, nothing) == bare
+    assert with_weak(bare, frame, replace(SMALL, observational=True), nothing) == bare
 
 
 OPTIONS = [Variable(f"option{i}", Role.OPTION, range=(0.0, 1.0), default=0.5) for i in range(8)]
