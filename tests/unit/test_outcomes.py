@@ -10,9 +10,9 @@ from care_core.causal.model import Model
 from care_core.learn.fitting import Effort, slopes
 from care_core.learn.outcomes import (
     FEW_RUNS,
+    Outcomes,
     ask_total,
     causes_of,
-    Outcomes,
     chosen,
     find_stages,
     fit_on,
