@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -37,6 +37,8 @@ class Session(Struct, eq=False):
     fix: Fix | None = None
     """What the ticked changes are predicted to bring; None while it is computed."""
     fix_error: CareError | None = None
+    tried: dict[tuple[str, float], float] = field(default_factory=dict)
+    """Odds of one change alone, of those that the operator ticked: option and value to probability."""
     unchanged: Fix | None = None
     """What the configuration as driven would bring again."""
     signals: list[Signal] | None = None
@@ -69,7 +71,7 @@ class Session(Struct, eq=False):
 
     def take(self, case: Case) -> None:
         """A diagnosis has come: start at its first fault, with the suggested fix in the basket."""
-        self.case, self._options = case, None
+        self.case, self._options, self.tried = case, None, {}
         names = [result.variable.name for result in case.diagnosis.objectives]
         statuses = [result.status for result in case.diagnosis.objectives]
         self.objective = statuses.index("fault") if "fault" in statuses else 0
@@ -92,11 +94,26 @@ class Session(Struct, eq=False):
         return values
 
     def alone(self) -> dict[tuple[str, float], float]:
-        """Probability of keeping all thresholds with one option alone at the value suggested for it as a cause."""
+        """Probability of keeping all thresholds with one option alone at a value: that suggested for it as a cause, and
+        those that were tried."""
         causes = [cause for fault in self.diagnosis.faults for cause in fault.causes]
-        return {
+        suggested = {
             (c.option.name, c.suggested): c.p_fixed for c in causes if not (c.suggested is None or c.p_fixed is None)
         }
+        return suggested | self.tried
+
+    def asked(self) -> list[dict[str, float]]:
+        """The changes whose odds are asked for: what is ticked, and where that is several each alone."""
+        ticked = self.basket.ticked
+        each = [{name: value} for name, value in ticked.items()] if len(ticked) > 1 else []
+        return [dict(ticked), *each]
+
+    def predicted(self, fixes: Sequence[Fix]) -> None:
+        """What was asked has its answers."""
+        self.fix = fixes[0]
+        for changes, odds in ((changes_of(fix), fix.odds) for fix in fixes):
+            if len(changes) == 1 and odds is not None:
+                self.tried |= dict.fromkeys(changes.items(), odds)
 
     def hypotheses(self) -> tuple[Hypothesis, ...]:
         """What explains the failure, the causes set aside left out and the others weighed anew."""
@@ -153,7 +170,7 @@ class Session(Struct, eq=False):
     def set_aside(self, option: str, reason: str) -> bool:
         """Set a cause aside; True when that changed the fix: the best one without it is ticked, where one is left that
         is worth its change."""
-        self.dismissed[option] = reason
+        self.dismissed[option], self.tried = reason, {}
         if option not in self.basket.ticked:
             return False
         self._before_aside[option] = dict(self.basket.ticked)
@@ -169,6 +186,7 @@ class Session(Struct, eq=False):
     def take_back(self, option: str) -> bool:
         """Undo `set_aside`; True when that put the option back into the fix."""
         del self.dismissed[option]
+        self.tried = {}
         before = self._before_aside.pop(option, None)
         if before is None or option in self.basket.ticked:
             return False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from asyncio import Lock
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
@@ -390,34 +390,34 @@ class CaseScreen(Screen[None]):
     def _decide(self, event: Decided) -> None:
         """Tell what follows from the boxes and the causes as they are now."""
         event.stop()
-        session, engine = self.session, self.workspace.engine
+        session = self.session
         if event.has_changed_fix and session.case is not None:
             session.fix = session.fix_error = None
-            changes, case = dict(session.basket.ticked), session.weighed_case()
+            case, asked = session.weighed_case(), session.asked()
             self.workers.cancel_group(self, PREDICTION)
-            self.run_worker(lambda: self._predict(lambda: engine.predict(case, changes)), group=PREDICTION, thread=True)
+            self.run_worker(lambda: self._predict(case, asked), group=PREDICTION, thread=True)
         with self.app.batch_update():
             self.query_one(AnswerBar).tell(session)
             self.page.show()
 
-    def _predict(self, predict: Callable[[], Fix]) -> None:
-        worker = get_current_worker()
+    def _predict(self, case: Case, asked: Sequence[Mapping[str, float]]) -> None:
+        worker, predict = get_current_worker(), self.workspace.engine.predict
         try:
-            answer: Fix | CareError = predict()
+            answer: list[Fix] | CareError = [predict(case, changes) for changes in asked]
         except Exception as err:
             answer = as_care_error(err)
         if not worker.is_cancelled:
             self.post_message(Answered(PREDICTION, answer))
 
-    def _predicted(self, answer: Fix | CareError) -> None:
+    def _predicted(self, answer: list[Fix] | CareError) -> None:
         if isinstance(answer, CareError):
             self.session.fix_error = answer
         else:
-            self.session.fix = answer
+            self.session.predicted(answer)
         with self.app.batch_update():
             self.query_one(AnswerBar).tell(self.session)
             self.page.enter()
-            self.page.show_text()
+            self.page.show()
 
 
 def _has_failed_part(health: Health) -> bool:

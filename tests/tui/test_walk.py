@@ -309,6 +309,19 @@ async def test_values_are_nudged_and_typed_as_whatif_takes_them_and_only_accepta
         assert walk(app).session.basket.ticked["LAND_SPEED"] == 999
 
 
+async def test_a_value_of_ones_own_has_odds_of_its_own_also_beside_other_changes(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "4", "minus")
+        tried = walk(app).session.alone()
+        assert ("LAND_SPEED", walk(app).session.basket.ticked["LAND_SPEED"]) in tried
+        await settle(pilot, "j", "plus")
+        ticked = walk(app).session.basket.ticked
+        assert len(ticked) == 2
+        assert set(ticked.items()) <= set(walk(app).session.alone())
+        assert walk(app).page.choices.plain.count("if only this") == 2
+
+
 async def test_slash_filters_and_escape_clears(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
