@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from care_core.ecosystems.ros.goals import Goal
+
 _METRES_PER_DEGREE = 111_195.0
 _GLOBAL = (("POS", "Lat", "Lng"), ("GPS", "Lat", "Lng"), ("vehicle_global_position", "lat", "lon"))
 _ITEMS = {
@@ -24,8 +26,13 @@ _ITEMS = {
 """Channels that hold a mission: number, latitude and longitude of its items, 0 where an item has no place."""
 _ORIGIN = ("ref_lon", "ref_lat")
 _LOCAL = (("vehicle_local_position", "y", "x"),)
-_POSES = {"Odometry": "pose.pose.position", "PoseWithCovarianceStamped": "pose.pose.position"}
-_GOALS = {"MoveBaseActionGoal": "goal.target_pose.pose.position", "PoseStamped": "pose.position"}
+_POSES = {
+    "NavigateToPose_FeedbackMessage": ("feedback.current_pose.pose.position", "feedback.current_pose.header.frame_id"),
+    "MoveBaseActionFeedback": ("feedback.base_position.pose.position", "feedback.base_position.header.frame_id"),
+    "PoseWithCovarianceStamped": ("pose.pose.position", "header.frame_id"),
+    "Odometry": ("pose.pose.position", "header.frame_id"),
+}
+"""Where messages of ROS say a position and its frame; those first that have that of the goals where odometry drifts."""
 _MOST = 2000
 """Points of a track."""
 
@@ -49,15 +56,13 @@ def way_of(case: OpenRun) -> Way:
             found = _track(case, (channel, east), (channel, north), span)
             if found is not None:
                 return _on_the_ground(*found, _flown_to(case, present))
-    sources = [((channel, x), (channel, y)) for channel, x, y in _LOCAL if channel in present]
-    sources += [((name, f"{_POSES[kind]}.x"), (name, f"{_POSES[kind]}.y"))
-                for name, type in present.items() if (kind := type_name(type)) in _POSES]  # fmt: skip
-    for x, y in sources:
-        found = _track(case, x, y, span)
+    for channel, x, y in _LOCAL:
+        found = _track(case, (channel, x), (channel, y), span) if channel in present else None
         if found is not None:
-            t, east_m, north_m = found
-            legs = _flown_from(case, present, x[0]) or _driven_to(case, present, span)
-            return Way(_points(east_m, north_m), tuple(t.tolist()), legs)
+            return _way(*found, _flown_from(case, present, channel))
+    driven = _driven(case, present, span)
+    if driven is not None:
+        return driven
     raise CareError("The log does not say where the robot was.", hint="Record its position.")
 
 
@@ -118,18 +123,49 @@ def _flown_to(case: OpenRun, present: Mapping[str, str]) -> tuple[Point, ...]:
     return tuple(items[number] for number in sorted(items))
 
 
-def _driven_to(case: OpenRun, present: Mapping[str, str], span: tuple[float, float]) -> tuple[Point, ...]:
-    """The goals that a ROS robot was sent to, in the order sent."""
-    for kind, field in _GOALS.items():
-        for name, type in present.items():
-            if type_name(type) != kind or "goal" not in name:
-                continue
-            x, y = (name, f"{field}.x"), (name, f"{field}.y")
-            lines = lines_of(case, (x, y), (0.0, span[1]))
-            east, north = lines[x], lines[y]
-            if east is not None and north is not None:
-                return _points(east[1], north[1])
-    return ()
+def _driven(case: OpenRun, present: Mapping[str, str], span: tuple[float, float]) -> Way | None:
+    """The way of a ROS robot, with its goals where a source of its position has their frame."""
+    goals = _goals(case)
+    frame = goals[0].frame.strip("/") if goals else ""
+    places = sorted(
+        ((list(_POSES).index(kind), name, *_POSES[kind])
+         for name, type in present.items() if (kind := type_name(type)) in _POSES)
+    )  # fmt: skip
+    drawn: Way | None = None
+    for _, name, position, frame_field in places:
+        found = _track(case, (name, f"{position}.x"), (name, f"{position}.y"), span)
+        if found is not None and frame and _frame(case, name, frame_field) in ("", frame):
+            return _way(*found, tuple((goal.x, goal.y) for goal in goals))
+        if found is not None and drawn is None:
+            drawn = _way(*found)
+    return drawn
+
+
+def _goals(case: OpenRun) -> tuple[Goal, ...]:
+    """The goals that a ROS robot was sent to, in the order sent, of those with a place in one frame."""
+    from care_core.ecosystems.registry import run_model
+    from care_core.ecosystems.ros.drive import Drive
+    from care_core.ecosystems.ros.measures.window import GOAL_SERVERS
+
+    model, spec = run_model(log_of(case)), case.schema.mission if case.schema is not None else {}
+    if not isinstance(model, Drive):
+        return ()
+    kinds = {kind: spec if spec.get("kind") == kind else {} for kind in GOAL_SERVERS}
+    sent = (GOAL_SERVERS[kind].goals(model, own) for kind, own in kinds.items())
+    placed = next(filter(None, (tuple(goal for goal in some if math.isfinite(goal.x + goal.y)) for some in sent)), ())
+    return tuple(goal for goal in placed if goal.frame == placed[0].frame)
+
+
+def _frame(case: OpenRun, channel: str, field: str) -> str:
+    """The frame of a channel's positions, empty where it names none."""
+    table = log_of(case).read({channel: (field,)}).get(channel)
+    return str(table[field][0]).strip("/") if table is not None and field in table.columns and len(table) else ""
+
+
+def _way(
+    t: NDArray[np.float64], east: NDArray[np.float64], north: NDArray[np.float64], legs: tuple[Point, ...] = ()
+) -> Way:
+    return Way(_points(east, north), tuple(t.tolist()), legs)
 
 
 def _points(east: NDArray[np.float64], north: NDArray[np.float64]) -> tuple[Point, ...]:

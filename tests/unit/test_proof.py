@@ -95,6 +95,9 @@ def test_the_way_is_in_metres_with_the_corners_that_were_asked_for() -> None:
     assert min(math.dist(px4.legs[1], point) for point in px4.track) < 15
     drive = way_of(care_core.triage(bundled("samples", "move_base_drive.bag")))
     assert [round(east) for east, _ in drive.legs] == [4, 7, 9, 12, 15]
+    nav2 = way_of(care_core.triage(bundled("samples", "nav2_mppi_failed.mcap")))
+    assert [(round(east), round(north)) for east, north in nav2.legs] == [(5, 7), (2, 2)], "ends of plans"
+    assert math.dist(nav2.legs[-1], nav2.track[-1]) == pytest.approx(0.3, abs=0.1), "it stopped short of the last"
     with pytest.raises(CareError, match="does not say where"):
         way_of(Case(sample.unfitting(), log=MadeLog({"ATT": {"Roll": T}})))
 
