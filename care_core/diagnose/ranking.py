@@ -13,7 +13,7 @@ from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, Ways
 from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
-from care_core.diagnose.symptoms import NOTHING, ROUNDING, pointers
+from care_core.diagnose.symptoms import NOTHING, ROUNDING, better_than_expected, pointers
 from care_core.records import Record
 from care_core.run import Evidence, Run, is_known
 from care_core.variables import Role
@@ -37,6 +37,8 @@ class Suspect(Record):
     that this run's own symptoms lay to the option."""
     symptom: str | None = None
     """The metric of this run that points at the option most."""
+    not_borne_out: tuple[str, ...] = ()
+    """Metrics on the path that were better in this run than the reference would give."""
 
     @property
     def is_identified(self) -> bool:
@@ -72,7 +74,8 @@ def suspects(
         said: what this run's messages say.
     """
     off = deviating(query.config, query.reference)
-    paths = best_paths(query.model, objective, off, _mediators(query))
+    better = better_than_expected(query, objective)
+    paths = best_paths(query.model, objective, off, _mediators(query) - better)
     effects = {name: query.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
     learned = [name for name in names if effects[name] is not None and objective in query.model.outcomes]
@@ -87,6 +90,7 @@ def suspects(
             effect=effects[name],
             weight=contribution[name] + unexplained * pointer.get(name, NOTHING).share,
             symptom=pointer.get(name, NOTHING).metric,
+            not_borne_out=tuple(node for node in paths[name].nodes if node in better),
         )
         for name in names
     ]

@@ -64,16 +64,36 @@ def pointers(
     }
 
 
+def better_than_expected(query: CounterfactualQuery, objective: str) -> frozenset[str]:
+    """Metrics that go with missing the objective and are on the other side of what the reference would give: what this
+    run lost was not lost there."""
+    found = set()
+    for metric, correlation in query.model.correlated_metrics.get(objective, {}).items():
+        value = _coded(query, metric)
+        if value is not None:
+            (expected,) = _latent(query, query.model.mechanisms[metric], [query.reference])
+            if correlation * (value - expected) < 0:
+                found.add(metric)
+    return frozenset(found)
+
+
+def _coded(query: CounterfactualQuery, metric: str) -> float | None:
+    """A metric of this run on the scale of its mechanism; None where it is not known or has no place there."""
+    mechanism, seen = query.model.mechanisms[metric], query.known(metric)
+    if seen is None or (not mechanism.binary and seen <= LEAST[mechanism.transform]):
+        return None
+    return 2 * seen - 1 if mechanism.binary else float(transformed(np.array(seen), mechanism.transform))
+
+
 def _split(
     query: CounterfactualQuery, metric: str, correlation: float, names: Sequence[str], known: Container[Edge]
 ) -> Mapping[str, float]:
-    mechanism, seen = query.model.mechanisms[metric], query.known(metric)
-    if seen is None or not names or (not mechanism.binary and seen <= LEAST[mechanism.transform]):
+    mechanism, value = query.model.mechanisms[metric], _coded(query, metric)
+    if value is None or not names:
         return {}
     reference = query.reference
     configs = [reference, query.config, *({**query.config, name: reference[name]} for name in names)]
     expected, here, *back = _latent(query, mechanism, configs)
-    value = 2 * seen - 1 if mechanism.binary else float(transformed(np.array(seen), mechanism.transform))
     scale = _scale(query, metric, mechanism)
     off = (value - expected) / scale
     if correlation * off <= 0:

@@ -553,6 +553,9 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float
         notes.append(Note(f"outside the training support ({summary.low:g} to {summary.high:g})", "outside_training"))
     if suspect.effect is not None and support < LOW_SUPPORT:
         notes.append(Note(f"a path to {suspect.path.nodes[-1]} was found in only {support:.0%} of resamples"))
+    if suspect.not_borne_out:
+        better = ", ".join(suspect.not_borne_out)
+        notes.append(Note(f"better than expected in this run, so hardly the way it went: {better}"))
     if case.profile.schema.observational:
         notes.append(Note(_chosen_by_operators(suspect.effect)))
     if suspect.option in case.query.kept:

@@ -14,6 +14,7 @@ from care_core.diagnose.ranking import (
     suspects,
 )
 from care_core.diagnose.reference import profile_config
+from care_core.diagnose.symptoms import better_than_expected
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.variables import Threshold
@@ -145,6 +146,27 @@ def test_a_path_is_not_led_over_an_edge_that_carries_nothing(planted: Profile) -
 
     lone = replace(model, graph=CausalGraph(graph.nodes, frozenset({direct})), edges={direct: edge(direct, 0.0)})
     assert best_paths(lone, "time", ["speed"])["speed"].nodes == direct
+
+
+def test_what_was_better_than_expected_carried_nothing_where_there_is_another_way(planted: Profile) -> None:
+    slow = planted_query(planted, reserve=58)
+    seen = {**slow.observed, "hold_s": 2.0}
+    here = replace(slow, observed=seen)
+    assert "hold_s" not in better_than_expected(slow, "time")
+    assert "hold_s" in better_than_expected(here, "time")
+    (before,), (found,) = ([one for one in suspects(at, "time") if one.option == "reserve"] for at in (slow, here))
+    assert (before.path.nodes, before.not_borne_out) == (("reserve", "hold_s", "time"), ())
+    # There is no other way in this graph: the path stays, and says that this run does not bear it out.
+    assert ("hold_s" in found.path.nodes) == (found.not_borne_out == ("hold_s",))
+    around = ("reserve", "time")
+    edges = {
+        **here.model.edges,
+        around: replace(here.model.edges["reserve", "hold_s"], source="reserve", target="time"),
+    }
+    graph = CausalGraph(here.model.graph.nodes, here.model.graph.directed | {around}, here.model.graph.bidirected)
+    wide = replace(here, model=replace(here.model, edges=edges, graph=graph))
+    (other,) = [one for one in suspects(wide, "time") if one.option == "reserve"]
+    assert (other.path.nodes, other.not_borne_out) == (around, ())
 
 
 def test_a_check_that_did_not_act_carried_nothing(planted: Profile) -> None:
