@@ -10,7 +10,7 @@ from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.ecosystems.ranking import SYMPTOMS
 from care_core.ecosystems.vehicles import flies, vehicle_of
-from care_core.logs.formats import format_named
+from care_core.logs.formats import MAVLINK_TLOG, format_named
 from care_core.run import Run, shown
 
 UPSETS: frozenset[FindingKind] = frozenset(("attitude", "crash", "motor", "takeoff", "thrust"))
@@ -71,7 +71,11 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
         return f"look at what this names: {name}"
     if has_failed and diagnosis.tell_more:
         return diagnosis.tell_more[0]
-    return "'care inspect LOG' tells what each profile would need" if diagnosis.profile.fit.verdict == "no" else ""
+    if diagnosis.profile.fit.verdict != "no":
+        return ""
+    if run.log.format == MAVLINK_TLOG.name and run.log.facts.get("stack") == "PX4":
+        return "triage the .ulg that the vehicle itself wrote: profile px4 reads it, and telemetry holds little of it"
+    return "'care inspect LOG' tells what each profile would need"
 
 
 def _named(diagnosis: Diagnosis) -> str:

@@ -217,7 +217,8 @@ class _Source(Record, eq=False):
         return extract is not None and extract.kind in _REQUESTED
 
     def _checks(self, mission: Mission) -> tuple[Check, ...]:
-        return self.kind.checks(mission) if self.schema.objectives else self.kind.outcome(mission)
+        checks = self.kind.checks(mission) if self.schema.objectives else self.kind.outcome(mission)
+        return tuple(replace(check, value=self._explained(check.value)) for check in checks)
 
     def _values(self, role: Role, mission: Mission, doubt: Unavailable | None) -> dict[str, Value]:
         if doubt is not None:

@@ -53,6 +53,15 @@ def test_a_part_that_failed_is_what_to_look_at_whatever_explains_more() -> None:
     assert next_step(failed(laser), has_failed=True) == "look at what this names: the laser falls silent"
 
 
+def test_telemetry_of_a_px4_vehicle_is_no_log_of_it() -> None:
+    made = failed()
+    log = replace(made.run.log, format="mavlink-tlog", facts={"stack": "PX4"})
+    unfit = replace(made.profile, fit=replace(made.profile.fit, verdict="no"))
+    heard = replace(made, run=replace(made.run, log=log), profile=unfit)
+    assert next_step(heard, has_failed=False).startswith("triage the .ulg that the vehicle itself wrote")
+    assert "care inspect" in next_step(replace(heard, run=made.run), has_failed=False)
+
+
 def test_what_drives_is_tried_at_walking_pace() -> None:
     run = made_run()
     rover = replace(run, log=replace(run.log, facts={"firmware": "ArduRover V4.5.4", "vehicle": "rover"}))

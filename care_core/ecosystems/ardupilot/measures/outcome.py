@@ -56,9 +56,9 @@ def _nothing_to_judge(mission: Mission, flown: FlownMission) -> Unavailable | No
         known = f"the log holds {len(held.items)} of the {len(held.items) + held.lacks} items of the mission"
         return Unavailable(known, "judge a log that is whole")
     if not flown.waypoints:
-        return Unavailable("the log names no waypoints", "record CMD")
+        return Unavailable("the log names no waypoints", "record CMD", "CMD")
     if "MSG" not in mission.tables:
-        return Unavailable("the log does not say which waypoints were reached", "record MSG")
+        return Unavailable("the log does not say which waypoints were reached", "record MSG", "MSG")
     return None
 
 

@@ -98,7 +98,7 @@ def mission_held(mission: Mission) -> HeldMission | Unavailable:
     flight = flight_of(mission)
     known = [one for one in flight.held_missions if one.since_s <= mission.end_s]
     if not known:
-        return Unavailable("the log names no mission items", "record CMD")
+        return Unavailable("the log names no mission items", "record CMD", "CMD")
     begun_s = _begun_s(mission)
     later = [one for one in known[1:] if one.since_s > begun_s]
     held = known[-len(later) - 1]

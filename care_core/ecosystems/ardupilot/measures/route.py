@@ -24,7 +24,7 @@ def waypoints_reached(mission: Mission, args: Args) -> Value:
     flown = flown_mission(mission)
     if isinstance(flown, Unavailable):
         return flown
-    return float(flown.reached) if flown.waypoints else Unavailable("the log names no waypoints", "record CMD")
+    return float(flown.reached) if flown.waypoints else Unavailable("the log names no waypoints", "record CMD", "CMD")
 
 
 @extractor("landing_error", needs=NEEDS, unit="m", rests_on=rests.landing)

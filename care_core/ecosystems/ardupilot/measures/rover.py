@@ -113,7 +113,7 @@ def full_throttle_speed(mission: Mission, args: Args) -> Value:
         return driven
     pushing = driven.where(driven["ThrOut"] > 0)
     if len(pushing) < _MIN_STEADY:
-        return Unavailable("the throttle says nothing of the speed", "record THR")
+        return Unavailable("the throttle says nothing of the speed", "record THR", "THR")
     return float(median(pushing["Speed"] / pushing["ThrOut"]) * 100.0)
 
 
