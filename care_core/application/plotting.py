@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from care_core.application.open_run import OpenRun
 from care_core.application.proof import finding_score, meanings
 from care_core.application.sharing import EVERYTHING, Sharing
+from care_core.application.signals import LONGEST_GAP, Signal, Source, lines_of, settled_s, signals_of, whole_of
 from care_core.application.signals import Line as Values
-from care_core.application.signals import Signal, Source, lines_of, settled_s, signals_of, whole_of
 from care_core.numbers import median
 from care_core.records import replace
 from care_core.report.marks import Mark, marks_of
@@ -29,8 +29,8 @@ MOST_POINTS = 400
 MOST_MARKS = 16
 _SAME = 12
 """Letters that two marks of one second share where they say the same."""
-_LONGEST_GAP, _LEAST_GAP = 5.0, 0.01
-"""A line is broken where it has no value for so many of its usual intervals, and for this share of the span."""
+_LEAST_GAP = 0.01
+"""Share of the span for which a line must have no value as well, to be broken."""
 
 _TOGETHER = {
     "RCOU": "",
@@ -180,7 +180,7 @@ def segments(
         order = np.argsort(t, kind="stable")
         t, values = t[order], values[order]
     steps = np.diff(t)
-    longest = max(_LONGEST_GAP * float(median(steps)) if len(steps) else 0.0, _LEAST_GAP * (span[1] - span[0]))
+    longest = max(LONGEST_GAP * float(median(steps)) if len(steps) else 0.0, _LEAST_GAP * (span[1] - span[0]))
     is_end = steps > longest
     if wrap is not None:
         is_end |= np.abs(np.diff(values)) > wrap / 2

@@ -13,6 +13,9 @@ from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.ecosystems.registry import ecosystem_of
 from care_core.records import Record, replace
 
+AROUND = 0.1
+"""Share of a mission that is drawn before and behind the time of a finding, at least."""
+
 Subject = Finding | Cause | ObjectiveResult
 Meaning = Callable[[str, str], Field]
 
@@ -73,6 +76,13 @@ class Proof(Record):
     start_s: float | None = None
     end_s: float | None = None
 
+    def around(self, whole: tuple[float, float]) -> tuple[float, float]:
+        """The time that it is about with as much before and behind, a tenth of the whole at least; else the whole."""
+        if self.start_s is None or self.end_s is None:
+            return whole
+        beside = max(self.end_s - self.start_s, AROUND * (whole[1] - whole[0]))
+        return max(self.start_s - beside, whole[0]), min(self.end_s + beside, whole[1])
+
 
 def meanings(case: OpenRun) -> Meaning:
     """What a signal of a run's log means, by channel and field; what a dictionary lacks is judged by its name."""
@@ -96,8 +106,19 @@ def proof_of(case: OpenRun, subject: Subject, signals: Sequence[Signal] | None =
     found = _finding_of(case, subject) if isinstance(subject, Cause) else subject
     scores = [(_score(found, one, meaning(one.channel, one.field)), one) for one in signals]
     ranked = tuple(one for score, one in sorted(scores, key=lambda pair: -pair[0]) if score > 0)
+    if isinstance(found, Finding):
+        ranked = _compared(found, ranked)
     is_span = isinstance(found, Finding) and found.end_s > found.onset_s
     return Proof(ranked, found.onset_s, found.end_s) if is_span and isinstance(found, Finding) else Proof(ranked)
+
+
+def _compared(finding: Finding, ranked: tuple[Signal, ...]) -> tuple[Signal, ...]:
+    """The signals, of a motor the first beside another motor: that it was driven harder shows where both are drawn."""
+    first, *others = ranked or (None,)
+    if first is None or first.wanted is not None or not _MOTOR.search(finding.title):
+        return ranked
+    other = next((one for one in others if one.channel == first.channel), None)
+    return (replace(first, wanted=(other.channel, other.field), is_beside=True), *others) if other else ranked
 
 
 def _finding_of(case: OpenRun, cause: Cause) -> Finding | Cause:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from care_core.application.open_run import OpenRun, log_of
 from care_core.errors import CareError
+from care_core.numbers import median
 from care_core.records import Record, replace
 
 if TYPE_CHECKING:
@@ -92,6 +93,10 @@ KNOWN_TYPES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 """The same by the type of a ROS message; what odometry was to follow is a velocity command."""
 
 
+LONGEST_GAP = 5.0
+"""A line is broken where it has no value for so many of its usual intervals."""
+
+
 class Signal(Record):
     """A number over time in a log, what it was to follow, and the variables of the profile that are read from it."""
 
@@ -99,6 +104,8 @@ class Signal(Record):
     field: str
     wanted: Source | None = None
     used_by: tuple[str, ...] = ()
+    is_beside: bool = False
+    """Whether what is drawn with it was no demand, but is another of its kind to compare it with."""
 
     @property
     def name(self) -> str:
@@ -106,14 +113,14 @@ class Signal(Record):
 
     @property
     def wanted_name(self) -> str:
-        """What it was to follow, without what both names share; empty where there is no such thing."""
+        """What is drawn with it, without what both names share; empty where there is no such thing."""
         if self.wanted is None:
             return ""
         return self.wanted[1] if self.wanted[0] == self.channel else " ".join(self.wanted)
 
 
 Columns = tuple[tuple[float, float] | None, ...]
-"""A line squeezed into columns: per column its least and its greatest value, None where there is none."""
+"""A line squeezed into columns: per column its least and its greatest value, None where it is broken."""
 
 
 class Trace(Record):
@@ -286,4 +293,12 @@ def _squeezed(t: NDArray[np.float64], values: NDArray[np.float64], span: tuple[f
     low, high = np.full(columns, np.inf), np.full(columns, -np.inf)
     np.minimum.at(low, place, values)
     np.maximum.at(high, place, values)
+    known = np.flatnonzero(low <= high)
+    if len(known) > 1:  # where samples are rarer than columns, a line joins them
+        every = np.arange(columns)
+        after = np.clip(np.searchsorted(known, every), 1, len(known) - 1)
+        width_s = (span[1] - span[0]) / columns
+        is_joined = (known[after] - known[after - 1]) * width_s <= LONGEST_GAP * float(median(np.diff(t))) + width_s
+        joined = is_joined & (low > high) & (every > known[0]) & (every < known[-1])
+        low[joined] = high[joined] = np.interp(every[joined], known, (low[known] + high[known]) / 2)
     return tuple((float(least), float(most)) if least <= most else None for least, most in zip(low, high, strict=True))

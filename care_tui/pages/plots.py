@@ -75,7 +75,8 @@ class PlotsPage(Page):
         def work() -> Proof:
             signals = signals_in(session, case)
             found = proof_of(case, subject, signals) if subject is not None else NOTHING
-            others = tuple(one for one in signals if one not in found.signals)
+            shown = {one.name for one in found.signals}
+            others = tuple(one for one in signals if one.name not in shown)
             return replace(found, signals=(*found.signals, *others))
 
         return view_of("Plots", self.fetched(PROOF, work), self._show)
@@ -99,7 +100,7 @@ class PlotsPage(Page):
         mark = self.glyphs.root if signal == self._beside else " "
         line = Content(f"{mark} ") + padded(signal.name, NAME_WIDTH, "bold")
         if signal.wanted_name:
-            line += text(f"  to follow {signal.wanted_name}")
+            line += text(f"  {'beside' if signal.is_beside else 'to follow'} {signal.wanted_name}")
         return line + text("  for " + ", ".join(signal.used_by), "dim") if signal.used_by else line
 
     def _detail(self, signal: Signal | None, proof: Proof) -> Rows:

@@ -49,7 +49,7 @@ def proof_rows(page: Page, name: str, subject: Subject, width: int, height: int)
         proof = proof_of(case, subject, signals_in(session, case))
         for signal in proof.signals[:3]:
             try:
-                return figure_of(case, signal, proof, whole_of(case), columns)
+                return figure_of(case, signal, proof, proof.around(whole_of(case)), columns)
             except CareError:  # it has no value in the mission: the next one may
                 continue
         return None

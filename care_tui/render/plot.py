@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 
 from textual.content import Content
 
@@ -92,7 +93,28 @@ def _filled(columns: Sequence[Column], low: float, high: float, tall: int) -> li
     def dot(value: float) -> int:
         return min(max(round((value - low) / span * (tall - 1)), 0), tall - 1)
 
-    return [None if part is None else (dot(part[0]), dot(part[1])) for part in columns]
+    return _joined([None if part is None else (dot(part[0]), dot(part[1])) for part in columns])
+
+
+def _joined(parts: Sequence[tuple[int, int] | None]) -> list[tuple[int, int] | None]:
+    """Neighbours of which each goes half of the way to the other, so that a line is not broken where it is steep."""
+    joined = list(parts)
+
+    def reach(place: int, low: int, high: int) -> None:
+        part = joined[place] or (low, high)
+        joined[place] = min(part[0], low), max(part[1], high)
+
+    for place, (one, following) in enumerate(pairwise(parts)):
+        if one is None or following is None:
+            continue
+        middle = (max(one[0], following[0]) + min(one[1], following[1])) // 2
+        if one[1] < following[0]:
+            reach(place, one[0], middle)
+            reach(place + 1, middle + 1, following[1])
+        elif following[1] < one[0]:
+            reach(place, middle + 1, one[1])
+            reach(place + 1, following[0], middle)
+    return joined
 
 
 def _star(part: tuple[int, int] | None, row: int, sign: str) -> str:
@@ -164,8 +186,8 @@ class Figure(Record):
         head = Content.assemble(named, "  " if self.meaning.label else "", text(self.signal.name, f"bold {ACTUAL}"))
         if not self.trace.wanted:
             return head
-        sign = ". " if glyphs is ASCII else ""
-        return head + Content.styled(f"  {sign}{clean(self.signal.wanted_name)} (wanted)", WANTED)
+        sign, why = ". " if glyphs is ASCII else "", "beside" if self.signal.is_beside else "wanted"
+        return head + Content.styled(f"  {sign}{clean(self.signal.wanted_name)} ({why})", WANTED)
 
     def _labels(self, high: int) -> dict[int, str]:
         """Round numbers at the lines nearest to them, and both ends where there is no round one."""

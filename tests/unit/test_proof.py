@@ -10,8 +10,8 @@ import pytest
 import care_core
 from care_core.application.case import Case, weighed_without
 from care_core.application.plotting import drawn_of, ranked
-from care_core.application.proof import proof_of
-from care_core.application.signals import settled_s, trace_of
+from care_core.application.proof import Proof, proof_of
+from care_core.application.signals import settled_s, trace_of, whole_of
 from care_core.application.track import way_of
 from care_core.diagnose.hypotheses import hypotheses_of
 from care_core.diagnose.noisy_or import CHANCE, NoisyOr
@@ -32,6 +32,17 @@ def motor() -> Case:
 def first(case: Case, title: str) -> str:
     finding = next(one for one in every_finding(case.diagnosis.health.findings) if title in one.title)
     return proof_of(case, finding).signals[0].name
+
+
+def test_a_motor_is_shown_beside_another_around_the_time_it_failed(motor: Case) -> None:
+    finding = next(one for one in every_finding(motor.diagnosis.health.findings) if "motor 4" in one.title)
+    proof = proof_of(motor, finding)
+    signal, (start_s, end_s) = proof.signals[0], proof.around(whole_of(motor))
+    assert (signal.name, signal.wanted, signal.is_beside) == ("RCOU C4", ("RCOU", "C1"), True)
+    assert (start_s, end_s) == pytest.approx((46.0, 108.6), abs=1.0)
+    assert trace_of(motor, signal, (start_s, end_s), 40).wanted
+    assert Proof(()).around((10.0, 20.0)) == (10.0, 20.0)
+    assert Proof((), 11.0, 19.0).around((10.0, 20.0)) == (10.0, 20.0)
 
 
 @pytest.mark.parametrize(
