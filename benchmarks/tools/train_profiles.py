@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 
 from care_core.files import bundled
-from care_core.learn.card import model_card
+from care_core.learn.card import write_card
 from care_core.learn.table import read_table
 from care_core.learn.train import TrainSettings, train
 from care_core.logs.finding import find_logs
@@ -189,7 +189,7 @@ def main() -> None:
         settings = TrainSettings(resamples=args.resamples, origin=SOURCES[name].origin)
         model = train(frame, schema, settings, lambda step, _share: print(f"  {step}", flush=True))
         write_model(model, folder)
-        (folder / "MODEL_CARD.md").write_text(model_card(schema, model), encoding="utf-8")
+        write_card(folder, schema)
         print(f"{name}: {len(frame)} runs, {time.monotonic() - started:.0f} s", flush=True)
 
 

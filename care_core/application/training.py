@@ -123,7 +123,7 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
 
 def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:
     from care_core.files import write_atomically
-    from care_core.learn.card import model_card
+    from care_core.learn.card import write_card
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -131,7 +131,7 @@ def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:
     except OSError as err:
         raise UsageError(f"Cannot write the profile: {err.strerror}.", where=str(out)) from err
     write_atomically(out / PROFILE_FILE, schema_text)
-    write_atomically(out / CARD_FILE, model_card(schema, model))
+    write_card(out, schema)
 
 
 def relearned_problems(profile: Profile) -> tuple[str, ...] | None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from care_core.causal.all_objectives import AllObjectives
 from care_core.causal.model import UNKNOWN_CARRY_OVER, EffectRecord, Model, SkillRecord
-from care_core.files import read_small_text
+from care_core.files import read_small_text, write_atomically
 from care_core.learn.identification import identify
 from care_core.metadata.causal_map import meaning_of
 from care_core.metadata.screening import screened
@@ -37,6 +38,11 @@ def model_card(schema: Schema, model: Model) -> str:
         _limits(schema, model),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def write_card(folder: Path, schema: Schema) -> None:
+    """Write the card of the model that lies in a profile folder: there its numbers are rounded."""
+    write_atomically(folder / CARD_FILE, model_card(schema, Profile(folder, schema).model))
 
 
 def recomputed(profile: Profile) -> tuple[str, ...]:
