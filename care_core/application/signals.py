@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from care_core.application.open_run import OpenRun, log_of
 from care_core.errors import CareError
-from care_core.numbers import median
 from care_core.records import Record, replace
 
 if TYPE_CHECKING:
@@ -288,6 +287,8 @@ def _line(table: Table | None, field: str, span: tuple[float, float]) -> Line | 
 
 def _squeezed(t: NDArray[np.float64], values: NDArray[np.float64], span: tuple[float, float], columns: int) -> Columns:
     import numpy as np
+
+    from care_core.numbers import median
 
     place = np.clip(((t - span[0]) / max(span[1] - span[0], 1e-9) * columns).astype(int), 0, columns - 1)
     low, high = np.full(columns, np.inf), np.full(columns, -np.inf)

@@ -95,7 +95,7 @@ MAVLINK_TLOG = LogFormat(
     reader=("care_core.logs.mavlink", "MavlinkLog"),
     suffixes=(".tlog",),
     looks_like=_is_mavlink,
-    missing_hint="telemetry does not carry it: use the log of the vehicle's memory card",
+    missing_hint="telemetry does not carry it: use the .BIN (PX4: the .ulg) of the vehicle's memory card",
 )
 PX4_ULG = LogFormat(
     name="px4-ulg",
