@@ -31,8 +31,8 @@ class Basket(Struct, eq=False):
     def set(self, option: str, value: float, *, current: float) -> None:
         """Tick one change; the value the run had unticks it."""
         self._remember()
-        self.ticked.pop(option, None)
         if value == current:
+            self.ticked.pop(option, None)
             self.values.pop(option, None)
         else:
             self.ticked[option] = self.values[option] = value

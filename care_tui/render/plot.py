@@ -14,7 +14,7 @@ from care_core.report.axes import tick_time, time_ticks, value_ticks
 from care_core.report.marks import Mark
 from care_core.text import LONG_S, clean, seconds
 from care_tui.render.health import sign_of
-from care_tui.render.rows import ASCII, Glyphs, Row, text
+from care_tui.render.rows import ASCII, Glyphs, Row, cut, text
 
 _BITS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 """Bits of the dots of a braille cell: by column, from the top down."""
@@ -176,7 +176,7 @@ class Figure(Record):
             shaded=glyphs.shade,
         )  # fmt: skip
         labels = self._labels(high)
-        rows = [Row(self._head(glyphs).truncate(width))]
+        rows = [Row(cut(self._head(glyphs), width, glyphs))]
         rows += [Row(Content.styled(f"{labels.get(y, ''):>{AXIS - 1}} ", "dim") + line) for y, line in enumerate(lines)]
         return [*rows, Row(self._signs(wide, span, glyphs)), Row(self._times(wide))]
 

@@ -46,6 +46,12 @@ def test_undo_takes_back_whatever_was_done(steps: list[str]) -> None:
     assert not basket.undo()
 
 
+def test_another_value_leaves_a_change_at_its_place() -> None:
+    basket = Basket({"a": 1.0, "b": 2.0}, {"a": 1.0, "b": 2.0})
+    basket.set("a", 1.5, current=0.0)
+    assert list(basket.ticked.items()) == [("a", 1.5), ("b", 2.0)]
+
+
 def test_the_value_of_the_run_is_no_change() -> None:
     basket = Basket()
     basket.set("a", 3.0, current=1.0)
