@@ -303,7 +303,7 @@ def _of_options(
     if against is not None:
         return _Advised(fixes, against)
     abstained = (
-        _abstains(case, faults, fixes, held, as_driven)
+        _abstains(case, faults, fixes, held, promise)
         or falls_short(fixes[0], broken, as_driven)
         or untried(fixes[0], case.profile.schema.learned_elsewhere)
         or unrecorded(fixes[0], case.choice.fit.verdict)
@@ -617,8 +617,9 @@ def _has_effect(case: _Case, option: str) -> bool:
 
 
 def _abstains(
-    case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix], held: Collection[str], as_driven: float
+    case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix], held: Collection[str], promise: Promise
 ) -> str | None:
+    as_driven = promise.as_driven()
     names = [fault.objective.variable.name for fault in faults]
     unknown = [name for name in names if name not in case.query.model.outcomes]
     if unknown:
@@ -645,7 +646,7 @@ def _abstains(
         )
     pinned = f", with {', '.join(sorted(case.query.kept))} kept as it is" if case.query.kept else ""
     broken = [fault.objective for fault in faults]
-    best = nearest(_resets(case, faults), broken)
+    best = nearest(promised(_resets(case, faults), promise), broken)
     short = falls_short(best, broken, as_driven) if best else None
     return f"{short or 'no change inside the acceptable ranges is likely enough to meet every limit'}{pinned}"
 
