@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 from care_core.diagnose.estimates import DOUBT
 from care_core.diagnose.verdict import exit_code, status_of
 from care_core.errors import ExitCode
-from care_core.report.document import Report
+from care_core.report.document import CauseEntry, Report
 from care_core.report.entries import ConsequenceEntry, FindingEntry
-from care_core.text import wrapped
+from care_core.text import percent, wrapped
 
 Check = Callable[[Report], bool]
 CONTRADICTIONS: dict[str, Check] = {}
 _DOWN = ("crash", "takeoff")
 _UPSET = ("attitude", "crash", "motor", "takeoff", "thrust")
 _ROUNDED, _UNTOLD = 1e-3, 0.06
+_REFUSED_CHANGE = re.compile(r"the best found, (\w+) \S+ -> ([^\s,]+)[^,]*, has ([^,]+),")
+"""Of a refusal that found one change, and no several."""
 _EXIT = {"OK": ExitCode.OK, "FAULT": ExitCode.FAULT, "NOT EVALUATED": ExitCode.NOT_EVALUATED}
 
 
@@ -49,6 +52,10 @@ def _critical(report: Report) -> list[FindingEntry]:
 
 def _objective(report: Report, name: str) -> str:
     return next((one.status for one in report.objectives if one.name == name), "")
+
+
+def _is_lead(cause: CauseEntry) -> bool:
+    return any("not ruled out" in note for note in cause.notes)
 
 
 def _changed(report: Report) -> list[str]:
@@ -193,11 +200,23 @@ def _(report: Report) -> bool:
     return any(one is not None and abs(one - _odds(report)) > _ROUNDED for one in alone) and _odds(report) > 0.0
 
 
+@_named("a refusal that gives its change other odds than the line of that cause")
+def _(report: Report) -> bool:
+    told = _REFUSED_CHANGE.search(report.abstained or "")
+    if told is None:
+        return False
+    option, value, odds = told.groups()
+    alone = [one for fault in report.faults for one in fault.causes if one.option == option]
+    same = [one for one in alone if f"{one.suggested:.4g}" == value and one.p_fixed is not None]
+    return any(percent(one.p_fixed) != odds for one in same)
+
+
 @_named("causes in another order than the explanations")
 def _(report: Report) -> bool:
     acts = {one.name: one.acts for one in report.hypotheses if one.what == "parameter"}
     for fault in report.faults:
-        told = [acts[one.option] for one in fault.causes if one.option in acts]
+        found = [one for one in fault.causes if not _is_lead(one)]  # what is only not ruled out comes after them
+        told = [acts[one.option] for one in found if one.option in acts]
         if any(later > sooner + 0.02 for sooner, later in pairwise(told)):
             return True
     return False
@@ -253,8 +272,8 @@ def _(report: Report) -> bool:
 @_named("a change of what is only not ruled out")
 def _(report: Report) -> bool:
     entries = [cause for fault in report.faults for cause in fault.causes if cause.option in _changed(report)]
-    leads = {one.option for one in entries if any("not ruled out" in note for note in one.notes)}
-    return bool(leads - {one.option for one in entries if not any("not ruled out" in note for note in one.notes)})
+    leads = {one.option for one in entries if _is_lead(one)}
+    return bool(leads - {one.option for one in entries if not _is_lead(one)})
 
 
 @_named("another change than the first cause's, without why")

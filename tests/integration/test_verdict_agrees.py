@@ -10,6 +10,7 @@ import pytest
 
 import care_core
 from benchmarks.wild_logs import wild_files
+from care_core import Request
 from care_core.errors import CareError
 from care_core.files import bundled
 from care_core.report.document import build_document
@@ -22,7 +23,8 @@ SAMPLES = (
     "arducopter_failed.BIN", "arducopter_motor.BIN", "ardurover_failed.BIN", "arduplane_elevator.BIN",
     "arduplane_failed.BIN", "ardusub_failed.BIN", "px4_failed.ulg", "px4_motor.ulg", "move_base_drive.bag",
     "nav2_failed.mcap",
-    "nav2_good.mcap", "nav2_stall.mcap", "owlat_failed.bag",
+    "nav2_good.mcap", "nav2_stall.mcap", "nav2_mppi_failed.mcap", "nav2_rpp_failed.mcap", "nav2_stock_failed.mcap",
+    "owlat_failed.bag",
 )  # fmt: skip
 WILD, KNOWN = 3, 9
 """Of the logs from elsewhere, and of the recorded runs with known truth, one of so many is looked at."""
@@ -44,6 +46,16 @@ def test_a_sample_contradicts_itself_nowhere(name: str) -> None:
 @pytest.mark.parametrize("name", ["arducopter_good.BIN", "move_base_good.bag"])
 def test_a_good_run_contradicts_itself_nowhere(name: str) -> None:
     assert told_of(DATA / name) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "limit_s"), [("nav2_mppi_failed.mcap", 30.0), ("arduplane_failed.BIN", 200.0), ("nav2_failed.mcap", 10.0)]
+)
+def test_a_limit_out_of_reach_contradicts_nothing(name: str, limit_s: float) -> None:
+    asked = Request(bundled("samples", name), thresholds={"mission_time": limit_s})
+    report = build_document(care_core.triage(asked).diagnosis)
+    assert report.abstained
+    assert contradictions(report) == []
 
 
 @pytest.mark.parametrize("share", [0.4, 0.8, 0.97])
