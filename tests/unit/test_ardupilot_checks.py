@@ -84,6 +84,20 @@ def test_an_uneven_load_moves_motors_in_pairs_and_is_no_lost_motor() -> None:
     assert made.find() == ()
 
 
+@pytest.mark.parametrize(("since_s", "kinds"), [(UP_S, []), (FAILS_S, ["motor"])])
+def test_the_load_of_a_tricopter_may_lie_on_one_motor_from_the_start(since_s: float, kinds: list[str]) -> None:
+    made = Made()
+    made.settings |= {
+        "FRAME_CLASS": 7,
+        "FRAME_TYPE": 0,
+        "SERVO3_FUNCTION": 0,
+        "SERVO4_FUNCTION": 36,
+        "SERVO7_FUNCTION": 39,
+    }
+    made.table["RCOU"]["C4"][made.after(since_s, DOWN_S)] += 250.0
+    assert [one.kind for one in made.find() if one.kind == "motor"] == kinds
+
+
 def test_a_motor_that_is_up_now_and_then_is_not_weak() -> None:
     made = Made()
     for start in range(30, 90, 12):

@@ -38,6 +38,9 @@ ALONE = LIMITS.add(
     "output of one motor above its peers", 0.08, "of the range",
     "in nine of ten healthy training flights none is 0.02 above; a twisted arm or an uneven load moves motors in pairs",
 )  # fmt: skip
+_IN_PAIRS = LIMITS.add(
+    "motors from which loads show in pairs", 4, "", "geometry: of three, one alone holds up the end that a load lies at"
+)
 _NEXT = LIMITS.add("share of that which the next motor may have", 0.6, "", "a choice: one motor, not a pair")
 _ROOM = LIMITS.add(
     "output of the peers on the ground", 0.7, "of the range", "a choice: above it all are at their limit"
@@ -243,6 +246,8 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     limit = float((share[n] > _AT_LIMIT).mean())
     before = _of_one(_smooth_excess(outputs, lifting, window), n)[t < start - 2.0]
     changed = len(before) >= 5 and float(median(before)) < size * _CHANGED
+    if not changed and len(outputs.motors) < _IN_PAIRS:
+        return
     over = size / ALONE
     yield _finding(
         outputs.motors[n], "lost thrust" if changed or over > 2 else "works harder than the others", start, end,
