@@ -39,6 +39,8 @@ class Suspect(Record):
     """The metric of this run that points at the option most."""
     not_borne_out: tuple[str, ...] = ()
     """Metrics on the path that were better in this run than the reference would give."""
+    by_physics: bool = False
+    """Whether what physics says of the objective reads the option, where training found no path."""
 
     @property
     def is_identified(self) -> bool:
@@ -76,9 +78,13 @@ def suspects(
     off = deviating(query.config, query.reference)
     better = better_than_expected(query, objective)
     paths = best_paths(query.model, objective, off, _mediators(query) - better)
+    physics = {name: CausalPath((name, objective), 0.0) for name in _in_physics(query.model, objective, off)}
+    by_physics = physics.keys() - paths.keys()
+    paths = physics | paths
     effects = {name: query.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
-    learned = [name for name in names if effects[name] is not None and objective in query.model.outcomes]
+    can_say = [name for name in names if effects[name] is not None or name in by_physics]
+    learned = can_say if objective in query.model.outcomes else []
     contribution = {**dict.fromkeys(names, 0.0), **_contributions(query, objective, learned)}
     unexplained = max(0.0, 1.0 - sum(max(0.0, share) for share in contribution.values()))
     pointer = pointers(query, objective, _acting_where_it_failed(query, objective, names, said), known, said)
@@ -91,6 +97,7 @@ def suspects(
             weight=contribution[name] + unexplained * pointer.get(name, NOTHING).share,
             symptom=pointer.get(name, NOTHING).metric,
             not_borne_out=tuple(node for node in paths[name].nodes if node in better),
+            by_physics=name in by_physics,
         )
         for name in names
     ]
@@ -99,6 +106,13 @@ def suspects(
     return tuple(
         sorted(found, key=lambda s: (-round(s.weight, 2), -round(repairs[s.option], 2), -s.total_effect, s.option))
     )
+
+
+def _in_physics(model: Model, objective: str, options: Sequence[str]) -> list[str]:
+    """The options that what physics says of the objective reads: they act on it whatever a search found."""
+    outcome = model.outcomes.get(objective)
+    nominal = model.mechanisms[outcome.mechanism].nominal if outcome is not None and not outcome.stages else None
+    return [] if nominal is None else [name for name in options if name in nominal.inputs]
 
 
 def _acting_where_it_failed(
@@ -192,12 +206,15 @@ def _contributions(query: CounterfactualQuery, objective: str, names: Sequence[s
     return dict(zip(names, map(float, np.where(np.abs(mean) > ROUNDING, mean, 0.0)), strict=True))
 
 
-def describe_path(path: CausalPath, query: CounterfactualQuery, run: Run) -> tuple[PathNode, ...]:
+def describe_path(
+    path: CausalPath, query: CounterfactualQuery, run: Run, *, by_physics: bool = False
+) -> tuple[PathNode, ...]:
     """The path as this run met it: at each node its value, and what the reference configuration would give."""
     nodes = []
     for i, name in enumerate(path.nodes):
         value = run.value(name)
         edge = query.model.edges.get(path.edges[i]) if i < len(path.edges) else None
+        is_unknown = edge is None and not by_physics and i < len(path.edges)
         nodes.append(
             PathNode(
                 name=name,
@@ -205,7 +222,7 @@ def describe_path(path: CausalPath, query: CounterfactualQuery, run: Run) -> tup
                 value=value if is_known(value) else None,
                 expected=_expected(name, query),
                 effect=None if edge is None else edge.signed_effect,
-                support=None if i == len(path.edges) else 0.0 if edge is None else edge.support,
+                support=0.0 if is_unknown else None if edge is None else edge.support,
             )
         )
     return tuple(nodes)

@@ -135,7 +135,8 @@ class PathNode(Record):
     effect: float | None = None
     """Standardised effect of the edge that leads to the next node, signed; None on the last node."""
     support: float | None = None
-    """Share of bootstrap resamples that hold the edge to the next node; None on the last node."""
+    """Share of bootstrap resamples that hold the edge to the next node; None on the last node, and of what physics
+    says."""
 
 
 NoteKind = Literal["outside_training", "in_the_log", "other"]

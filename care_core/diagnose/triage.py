@@ -465,9 +465,9 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
     option = case.profile.schema.variables[name]
     is_predictable = result.variable.name in query.model.outcomes and name not in query.kept
     best = best_alone(query, name) if is_predictable else None
-    path = describe_path(suspect.path, query, case.run)
+    path = describe_path(suspect.path, query, case.run, by_physics=suspect.by_physics)
     in_support = query.model.supports(name, query.config[name])
-    support = (suspect.effect.support if suspect.effect is not None else None) or 0.0
+    support = 1.0 if suspect.by_physics else (suspect.effect.support if suspect.effect is not None else None) or 0.0
     changed = query.config if best is None else {**query.config, name: best[0]}
     return Cause(
         rank=rank,
@@ -542,7 +542,9 @@ def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_suppo
 def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float) -> tuple[Note, ...]:
     notes: list[Note] = []
     left = ": not ruled out" if suspect.weight < MIN_CONTRIBUTION else ""
-    if suspect.effect is None:
+    if suspect.by_physics:
+        notes.append(Note(f"{suspect.path.nodes[-1]} follows from it by physics; training found no other way"))
+    elif suspect.effect is None:
         notes.append(Note(f"no effect on {suspect.path.nodes[-1]} was seen in training{left}"))
     elif suspect.contribution < MIN_CONTRIBUTION:
         notes.append(Note(f"costs this run little, by what training says{left}"))

@@ -171,9 +171,9 @@ def statistics_rows(cause: Cause, rivals: Sequence[Cause], effect: EffectRecord 
 
 
 def edge_line(node: PathNode) -> Content:
-    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f} sd"
     if node.support is None:
-        return Content(effect)
+        return Content("by physics")
+    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f} sd"
     line = Content(f"{effect}, in {percent(node.support)} of resamples")
     return line + Content.styled("  ! few", "$text-warning") if node.support < FEW_RESAMPLES else line
 

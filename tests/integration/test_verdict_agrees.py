@@ -21,10 +21,9 @@ from tests.whole import one_in
 DATA = Path(__file__).parents[1] / "data"
 SAMPLES = (
     "arducopter_failed.BIN", "arducopter_motor.BIN", "ardurover_failed.BIN", "arduplane_elevator.BIN",
-    "arduplane_failed.BIN", "ardusub_failed.BIN", "px4_failed.ulg", "px4_motor.ulg", "move_base_drive.bag",
-    "nav2_failed.mcap",
-    "nav2_good.mcap", "nav2_stall.mcap", "nav2_mppi_failed.mcap", "nav2_rpp_failed.mcap", "nav2_stock_failed.mcap",
-    "owlat_failed.bag",
+    "arduplane_failed.BIN", "ardusub_failed.BIN", "quadplane_failed.BIN", "px4_failed.ulg", "px4_motor.ulg",
+    "move_base_drive.bag", "nav2_failed.mcap", "nav2_good.mcap", "nav2_stall.mcap", "nav2_mppi_failed.mcap",
+    "nav2_rpp_failed.mcap", "nav2_stock_failed.mcap", "owlat_failed.bag",
 )  # fmt: skip
 WILD, KNOWN = 3, 9
 """Of the logs from elsewhere, and of the recorded runs with known truth, one of so many is looked at."""

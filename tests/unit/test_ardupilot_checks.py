@@ -13,6 +13,7 @@ from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.ardupilot.spans import runs
 from care_core.ecosystems.findings import Finding, every_finding
+from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
 from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made, flight_of
@@ -140,6 +141,15 @@ def test_an_impact_is_after_the_loss_of_control_and_what_follows_it_is_marked() 
     assert flight.lost_control_s is not None
     assert flight.lost_control_s < flight.impact_s <= FAILS_S + 2.5
     assert all(one.after_impact for one in made.find() if one.onset_s > flight.impact_s)
+
+
+def test_a_mission_has_failed_that_fell_though_the_log_ends_armed_and_nothing_was_said_of_it() -> None:
+    made = Made()
+    falling(made, -60.0, 40.0)
+    made.rows = {"MODE": [(0.0, {"ModeNum": 3.0})], "ARM": made.rows["ARM"][:1]}
+    flight = made.flight()
+    mission = Mission(flight, {}, ARMED_S, END_S, False, {}, {})
+    assert find_extractor("mission_success").compute(mission, {}) == 0.0
 
 
 @pytest.mark.parametrize(("reached_s", "is_lost"), [(FAILS_S - 5, True), (FAILS_S + 3, True), (FAILS_S + 20, False)])

@@ -104,8 +104,7 @@ def hit_of(mission: Mission) -> Hit | None:
 
 def failed(mission: Mission) -> bool:
     """Whether something ended the flight for good: no landing after it makes the mission a success."""
-    crashed = bool(has_event(mission, "crash")) or hit_of(mission) is not None
-    return forced(mission) or crashed or bool(has_event(mission, "failsafe"))
+    return forced(mission) or bool(crash_of(mission)) or bool(has_event(mission, "failsafe"))
 
 
 def is_over(mission: Mission) -> bool:

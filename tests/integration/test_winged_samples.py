@@ -1,0 +1,22 @@
+"""What a QuadPlane's operator asks of a mission that took too long: no search found the cause, physics has it."""
+
+from __future__ import annotations
+
+import care_core
+from care_core.files import bundled
+
+
+def test_circles_that_are_too_wide_are_the_cause_by_physics_and_their_radius_is_advised() -> None:
+    diagnosis = care_core.triage(bundled("samples", "quadplane_failed.BIN")).diagnosis
+    assert diagnosis.profile.name == "quadplane"
+    first = diagnosis.hypotheses[0]
+    assert (first.what, first.name) == ("parameter", "WP_LOITER_RAD")
+    assert diagnosis.fix is not None
+    (change,) = diagnosis.fix.changes
+    assert (change.option.name, change.current, change.suggested) == ("WP_LOITER_RAD", 249.0, 60.0)
+    for fault in diagnosis.faults:
+        cause = fault.causes[0]
+        assert [node.name for node in cause.path] == ["WP_LOITER_RAD", fault.objective.variable.name]
+        assert cause.path[0].support is None, "no resample is asked about physics"
+        assert any("physics" in note.text for note in cause.notes)
+        assert cause.p_fixed == diagnosis.fix.p_fixed
