@@ -12,8 +12,9 @@ from care_core.causal.kernel import FloatArray
 from care_core.diagnose.fixes import candidate_values
 from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Experiment, Fault
-from care_core.records import replace
+from care_core.records import Record, replace
 from care_core.run import Run, Unavailable
+from care_core.text import percent
 
 TELLING = 0.15
 """Probability by which an experiment's outcome must differ between two causes to be worth a run."""
@@ -30,6 +31,19 @@ MET = "what this run met"
 """The rival of a cause that stands alone."""
 
 
+class AllBack(Record):
+    """Every option that is off its reference put back at once: what is left where no few changes promise enough."""
+
+    options: int
+    odds: float
+
+    def told(self, again: str) -> str:
+        return (
+            f"put all {self.options} parameters back that are off their reference and {again}: {percent(self.odds)} "
+            "probability that all objectives are met; if they are, change half of them at a time again"
+        )
+
+
 def tell_more(
     query: CounterfactualQuery,
     faults: Sequence[Fault],
@@ -39,6 +53,7 @@ def tell_more(
     observational: bool = False,
     again: str = AGAIN,
     nothing_else: str = SAME_AGAIN,
+    all_back: AllBack | None = None,
 ) -> tuple[str, ...]:
     """Sentences for an operator, the most useful first; empty where nothing would help.
 
@@ -47,8 +62,10 @@ def tell_more(
         observational: operators chose the options of the training runs.
         again: how a change is tried.
         nothing_else: what is left to be done where nothing of this would help.
+        all_back: everything at its reference, where that promises more than what is advised.
     """
-    advice = [*([] if run.config else [TELL]), *_unrecorded(faults, run)]
+    advice = [*([] if run.config else [TELL]), *([] if all_back is None else [all_back.told(again)])]
+    advice += _unrecorded(faults, run)
     for fault in faults:
         objective = fault.objective.variable.name
         advice += [

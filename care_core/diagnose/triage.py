@@ -67,7 +67,7 @@ from care_core.diagnose.records import (
     OutsideSuspect,
 )
 from care_core.diagnose.since import compare, with_evidence
-from care_core.diagnose.tell_more import AGAIN, SAME_AGAIN, tell_more
+from care_core.diagnose.tell_more import AGAIN, SAME_AGAIN, AllBack, tell_more
 from care_core.ecosystems.findings import NOTHING_SEEN, Finding, Health, every_finding
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
@@ -216,6 +216,7 @@ def diagnose(
     if abstained is None and lead is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)
     faults = _as_ranked(promised_causes(faults, promise), failure)
+    all_back = _all_back(case, promise, as_driven if abstained or fixes[0].odds is None else fixes[0].odds)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
@@ -230,7 +231,7 @@ def diagnose(
         notes=_notes(case, broken, None if abstained or lead else fixes[0], as_driven),
         missions=judged.missions,
         rivals=circumstances(run, query, schema) if unsure else (),
-        tell_more=_tell_more(case, faults, health) if unsure and not out_of_reach else (),
+        tell_more=_tell_more(case, faults, health, all_back) if unsure and not out_of_reach else (),
         health=health,
         hypotheses=hypotheses,
         failure=failure,
@@ -327,7 +328,18 @@ def _weights(outside: Sequence[OutsideSuspect]) -> dict[str, float]:
     return {one.name: one.weight for one in outside}
 
 
-def _tell_more(case: _Case, faults: tuple[Fault, ...], health: Health) -> tuple[str, ...]:
+def _all_back(case: _Case, promise: Promise, advised: float) -> AllBack | None:
+    """Everything at its reference, where that promises more than the advised change, by as much as is worth one."""
+    query, held = case.query, _failsafes_held(case, case.findings)
+    off = sorted(_off(case) - query.kept - held)
+    back = {name: value for name in off if query.variables[name].accepts(value := query.reference[name])}
+    if len(back) < 2 or case.profile.schema.learned_elsewhere:
+        return None
+    odds = float(promise.odds([{**query.config, **back}])[0])
+    return AllBack(len(back), odds) if odds >= max(advised + WORTH.value, MIN_PROBABILITY) else None
+
+
+def _tell_more(case: _Case, faults: tuple[Fault, ...], health: Health, all_back: AllBack | None) -> tuple[str, ...]:
     upset = was_upset(case.run, health.findings)
     return tell_more(
         case.query,
@@ -337,6 +349,7 @@ def _tell_more(case: _Case, faults: tuple[Fault, ...], health: Health) -> tuple[
         observational=case.profile.schema.observational,
         again=f"try it {trial(case.run)}" if upset else AGAIN,
         nothing_else=bench(case.run) if upset else SAME_AGAIN,
+        all_back=all_back,
     )
 
 

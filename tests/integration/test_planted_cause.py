@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -334,3 +335,21 @@ def test_a_safety_option_with_codes_never_takes_a_looser_one(planted: Profile) -
     diagnosis = diagnosed(planted_run(planner=2), Profile(planted.path, schema))
     assert diagnosis.fix is not None
     assert [c.suggested for c in diagnosis.fix.changes] == [DEFAULTS["planner"]]
+
+
+def test_where_no_few_changes_are_enough_everything_is_put_back(planted: Profile) -> None:
+    """Five options break what they can: no four of them repair it."""
+    run = planted_run(speed=1.5, accel=3.9, radius=0.95, reserve=58, planner=2)
+    diagnosis = diagnosed(run, planted, time=150)
+    assert diagnosis.fix is None
+    told = diagnosis.tell_more[0]
+    assert told.startswith("put all 5 parameters back that are off their reference and run again: ")
+    odds = re.search(r"(\d+)% probability that all objectives are met", told)
+    assert odds is not None
+    assert int(odds.group(1)) > 60
+
+
+def test_what_is_pinned_is_not_put_back_with_everything_else(planted: Profile) -> None:
+    run = planted_run(speed=1.5, accel=3.9, radius=0.95, reserve=58, planner=2)
+    diagnosis = diagnosed(run, planted, keep=("radius",), time=150)
+    assert not any("put all" in one for one in diagnosis.tell_more), "without the radius the rest repairs nothing"
