@@ -97,7 +97,7 @@ def _undone(diagnosis: Diagnosis) -> str:
     if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
     named = first if first is not None and first.what == "parameter" and first.name else None
-    if named is not None and any(one.title.startswith(named.name) for one in findings):
+    if named is not None and any(one.title.startswith(named.name) or named.name in dict(one.wanted) for one in findings):
         return f"put {named.name} back as the findings say"
     if named is not None and named.name not in diagnosis.run.config:
         return _looked_at(named.name, diagnosis)

@@ -129,6 +129,29 @@ def test_a_transition_of_a_quadplane(done_s: float | None, is_slow: bool) -> Non
     assert told == ["the transition to the wings takes too long"] * is_slow
 
 
+@pytest.mark.parametrize(("spin_most", "suspect"), [(0.6, "parameter"), (0.95, "hardware")])
+def test_a_quadplane_that_stays_on_the_ground_with_all_its_lift(spin_most: float, suspect: str) -> None:
+    flown = MadePlane()
+    flown.settings |= {"Q_ENABLE": 1, "Q_M_SPIN_MAX": spin_most}
+    for name in ("POS", "GPS"):
+        for field, standing in flown.table[name].items():
+            flown.table[name][field] = np.full(len(standing), standing[0])
+    flown.table["GPS"]["Spd"][:] = 0.0
+    flown.table["CTUN"]["As"][:] = 0.0
+    flown.table["QTUN"] = {"ThO": np.where((flown.t > 12.0) & (flown.t < DOWN_S), 1.0, 0.0)}
+    finding = next(one for one in every_finding(flown.find()) if one.title == "too little thrust to take off")
+    assert (finding.severity, finding.suspect) == ("critical", suspect)
+    assert finding.onset_s == pytest.approx(12.0, abs=0.5)
+    assert finding.wanted == ((("Q_M_SPIN_MAX", 0.95),) if suspect == "parameter" else ())
+
+
+def test_a_quadplane_that_takes_off_with_all_its_lift_may_climb() -> None:
+    flown = MadePlane()
+    flown.settings |= {"Q_ENABLE": 1, "Q_M_SPIN_MAX": 0.6}
+    flown.table["QTUN"] = {"ThO": np.where((flown.t > 10.0) & (flown.t < 25.0), 1.0, 0.0)}
+    assert not any("take off" in one.title for one in every_finding(flown.find()))
+
+
 def test_a_record_that_lost_its_attitude_for_a_while_is_read() -> None:
     """A plane of which an attitude stands still for a while was once read with arrays of two lengths."""
     flown = MadePlane()

@@ -40,7 +40,7 @@ from care_core.ecosystems.ardupilot.checks.settings import (
     supply,
     thrust_curve,
 )
-from care_core.ecosystems.ardupilot.checks.wings import airspeed, propeller, surfaces, transition
+from care_core.ecosystems.ardupilot.checks.wings import airspeed, lift, propeller, surfaces, transition
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -54,6 +54,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     driven.CHECK,
     outputs.CHECK,
     airspeed.CHECK,
+    lift.CHECK,
     propeller.CHECK,
     surfaces.CHECK,
     transition.CHECK,
