@@ -555,9 +555,7 @@ def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_suppo
 def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float) -> tuple[Note, ...]:
     notes: list[Note] = []
     left = ": not ruled out" if suspect.weight < MIN_CONTRIBUTION else ""
-    if suspect.by_physics:
-        notes.append(Note(f"{suspect.path.nodes[-1]} follows from it by physics; training found no other way"))
-    elif suspect.effect is None:
+    if suspect.effect is None and not suspect.by_physics:
         notes.append(Note(f"no effect on {suspect.path.nodes[-1]} was seen in training{left}"))
     elif suspect.contribution < MIN_CONTRIBUTION:
         notes.append(Note(f"costs this run little, by what training says{left}"))

@@ -167,7 +167,8 @@ def statistics_rows(cause: Cause, rivals: Sequence[Cause], effect: EffectRecord 
     if not cause.is_lead:
         rows.append(labelled("Contribution", f"{lowers(cause)} of a run without a fault"))
         rows += _runner_up(cause, rivals)
-    return [*rows, labelled("Usual effect", _effect(cause, effect))]
+    is_learned = cause.path[0].support is not None
+    return [*rows, labelled("Usual effect", _effect(cause, effect))] if is_learned else rows
 
 
 def edge_line(node: PathNode) -> Content:

@@ -12,12 +12,14 @@ from textual.dom import DOMNode
 from textual.pilot import Pilot
 from textual.widgets import Static
 
-from care_core.diagnose.records import Circumstance, Diagnosis, Fault
+from care_core.diagnose.records import Circumstance, Diagnosis, Fault, PathNode
 from care_core.errors import ExitCode
 from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.page_names import NAMES
 from care_tui.pages.making import page_classes
+from care_tui.render.causes import statistics_rows
+from care_tui.render.rows import UNICODE
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
 from care_tui.screens.export import ExportDialog
@@ -123,6 +125,13 @@ async def test_the_objectives_tell_all_three_states_and_where_the_run_came_from(
             assert line in items(app)
         await settle(pilot, "G")
         assert "LOG_BITMASK" in text(app)
+
+
+def test_what_physics_says_was_found_in_no_resample() -> None:
+    path = (PathNode("LAND_SPEED", "cm/s", 16.0, 50.0), PathNode("mission_time", "s", 187.25, 139.0))
+    told = [row.content.plain for row in statistics_rows(replace(sample.LANDS_SLOWLY, path=path), (), None, UNICODE)]
+    assert "LAND_SPEED → mission_time  by physics" in told
+    assert not any("resamples" in line or "Usual effect" in line for line in told)
 
 
 async def test_the_path_follows_the_highlighted_cause(make_app: MakeApp) -> None:
