@@ -97,11 +97,16 @@ def _undone(diagnosis: Diagnosis) -> str:
     if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
     named = first if first is not None and first.what == "parameter" and first.name else None
-    if named is not None and any(one.title.startswith(named.name) or named.name in dict(one.wanted) for one in findings):
+    if named is not None and any(one.title.startswith(named.name) or _names(one, named.name) for one in findings):
         return f"put {named.name} back as the findings say"
     if named is not None and named.name not in diagnosis.run.config:
         return _looked_at(named.name, diagnosis)
     return ""
+
+
+def _names(finding: Finding, parameter: str) -> bool:
+    """Whether a finding says what a parameter should be."""
+    return any(name == parameter for name, _ in finding.wanted)
 
 
 def _looked_at(name: str, diagnosis: Diagnosis) -> str:
