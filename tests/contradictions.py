@@ -207,8 +207,8 @@ def _(report: Report) -> bool:
         return False
     option, value, odds = told.groups()
     alone = [one for fault in report.faults for one in fault.causes if one.option == option]
-    same = [one for one in alone if f"{one.suggested:.4g}" == value and one.p_fixed is not None]
-    return any(percent(one.p_fixed) != odds for one in same)
+    said = [one.p_fixed for one in alone if one.suggested is not None and f"{one.suggested:.4g}" == value]
+    return any(share is not None and percent(share) != odds for share in said)
 
 
 @_named("causes in another order than the explanations")
