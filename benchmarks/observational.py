@@ -30,9 +30,9 @@ from benchmarks.diagnosis import abducted
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
+from care_core.diagnose.advising import MIN_PROBABILITY
 from care_core.diagnose.ranking import deviating, suspects
 from care_core.diagnose.reference import profile_config
-from care_core.diagnose.triage import MIN_PROBABILITY
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.outcomes import met
 from care_core.learn.train import TrainSettings, train

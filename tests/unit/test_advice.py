@@ -17,10 +17,10 @@ from care_core.diagnose.advice import (
     no_stand_out,
     outweighed,
 )
+from care_core.diagnose.advising import failsafes_held
 from care_core.diagnose.circumstances import battery_is_low
 from care_core.diagnose.parts import mend_first, unmended
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
-from care_core.diagnose.triage import _failsafes_held
 from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding, FindingKind, Severity, SuspectKind
 from care_core.profile.store import load_profile
 from care_core.records import replace
@@ -229,5 +229,5 @@ def test_a_battery_failsafe_is_lowered_for_no_battery_that_may_not_be_full(
     profile = load_profile("arducopter")
     run = replace(made_run(), context={"start_voltage": volts})
     case = SimpleNamespace(run=run, query=SimpleNamespace(model=profile.model), profile=profile)
-    held = _failsafes_held(cast(Any, case), [] if finding is None else [finding])
+    held = failsafes_held(cast(Any, case), [] if finding is None else [finding])
     assert held == (frozenset({"BATT_LOW_VOLT"}) if is_held else frozenset())

@@ -1,0 +1,268 @@
+"""What is advised of a failed run: the fixes, the advised one first, or why none is."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from care_core.diagnose.advice import falls_short, is_worth, nearest, no_stand_out, promised, unrecorded, untried
+from care_core.diagnose.causes import MIN_CONTRIBUTION
+from care_core.diagnose.circumstances import battery_is_low
+from care_core.diagnose.estimates import NECESSARY, WORTH
+from care_core.diagnose.failed_run import FailedRun
+from care_core.diagnose.fixes import (
+    GAIN_FOR_ONE_MORE,
+    MAX_ALTERNATIVES,
+    Assignment,
+    needs_unsafe,
+    search,
+    settled,
+    smallest_good,
+    to_fix,
+)
+from care_core.diagnose.judging import Judged
+from care_core.diagnose.next_step import was_refused
+from care_core.diagnose.outside.change import Advisable, check_first, outside_fix
+from care_core.diagnose.parts import mend_first
+from care_core.diagnose.promise import Promise
+from care_core.diagnose.ranking import deviating
+from care_core.diagnose.records import Fault, Fix, Hypothesis
+from care_core.diagnose.tell_more import AllBack
+from care_core.ecosystems.findings import Finding, every_finding
+from care_core.records import Record, replace
+
+BESIDE = 0.3
+"""Share of the leading parameter's probability from which an option is changed with it."""
+MIN_PROBABILITY = 0.2
+"""Best probability below which the engine abstains: a confident wrong answer costs a field day."""
+
+
+class Advised(Record):
+    """The fixes, the advised one first, or why none is advised."""
+
+    fixes: Sequence[Fix]
+    abstained: str | None
+    why: str = ""
+
+
+def of_outside(lead: Advisable, case: FailedRun, hypotheses: Sequence[Hypothesis], promise: Promise) -> Advised:
+    """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside it.
+    A vehicle that never armed has its mission still before it: then the odds are those of the mission, too."""
+    if not lead.is_advised:
+        return Advised((), check_first(lead))
+    query = case.query
+    beside = _beside(lead, case, hypotheses, promise)
+    odds = promise.without(lead.name, {**query.config, **beside})
+    if was_refused(case.findings):
+        odds *= float(replace(query, observed={}, repeats=()).probability([query.config])[0])
+    changes = to_fix(query, beside, odds).changes if beside else ()
+    return Advised((outside_fix(lead, odds, case.run, changes),), None, lead.why)
+
+
+def _beside(lead: Advisable, case: FailedRun, hypotheses: Sequence[Hypothesis], promise: Promise) -> dict[str, float]:
+    """The options that go back to their reference with a parameter outside the profile: those that are about as likely,
+    and those without which its change promises much less."""
+    query = case.query
+    likely = {one.name for one in hypotheses if one.what == "parameter" and one.acts >= BESIDE * lead.probability}
+    off = case.off - query.kept - failsafes_held(case, case.findings)
+    free = {name: value for name in sorted(off) if query.variables[name].accepts(value := query.reference[name])}
+    chosen = {name: value for name, value in free.items() if name in likely}
+    while rest := free.keys() - chosen:
+        now = promise.without(lead.name, {**query.config, **chosen})
+        odds = {name: promise.without(lead.name, {**query.config, **chosen, name: free[name]}) for name in sorted(rest)}
+        best = max(odds, key=lambda name: odds[name])
+        if odds[best] < now + GAIN_FOR_ONE_MORE:
+            break
+        chosen[best] = free[best]
+    return chosen
+
+
+def of_options(
+    case: FailedRun,
+    judged: Judged,
+    faults: tuple[Fault, ...],
+    hypotheses: Sequence[Hypothesis],
+    options: Collection[str],
+    promise: Promise,
+    against: str | None,
+) -> Advised:
+    """What is advised of the options of the profile.
+
+    Args:
+        options: those that may have moved what broke.
+        against: why nothing is advised whatever is found, None where nothing stands against it.
+    """
+    broken, as_driven = judged.broken, promise.as_driven()
+    held = failsafes_held(case, case.findings)
+    held_too = held | _leads(faults)
+    found = _fixes(case, options, held_too, promise)
+    if idle := _idle(judged, found[:1], promise):
+        found = _fixes(case, options, held_too | idle, promise)
+    fixes = promised(found, promise)
+    if against is not None:
+        return Advised(fixes, against)
+    abstained = (
+        _abstains(case, faults, fixes, held, promise)
+        or falls_short(fixes[0], broken, as_driven)
+        or untried(fixes[0], case.profile.schema.learned_elsewhere)
+        or unrecorded(fixes[0], case.choice.fit.verdict)
+        or no_stand_out(fixes[0], as_driven, hypotheses, _necessary(promise, fixes[0]))
+    )
+    shown = None if abstained is None else _shown_by_run(case, hypotheses)
+    return Advised(fixes, abstained) if shown is None else Advised((shown,), None)
+
+
+def _fixes(case: FailedRun, options: Collection[str], held: Collection[str], promise: Promise) -> list[Fix]:
+    """The suggested fix first, then up to three that trade changes for probability or take another way.
+
+    Args:
+        held: options that are not changed.
+    """
+    # Options off their reference that break another objective matter too once this fault is gone.
+    off = deviating(case.query.config, case.query.reference)
+    free = sorted({*options, *(name for name in off if _has_effect(case, name))} - {*held, *case.query.kept})
+    found = _as_promised(search(case.query, free), promise)
+    if not found:
+        return []
+    chosen = smallest_good(found)
+    others = [found[i] for i in range(len(found)) if i != chosen and abs(i - chosen) == 1]
+    without = [name for name in free if name not in found[chosen][0]]
+    detour = _as_promised(search(case.query, without), promise)
+    others += [detour[smallest_good(detour)]] if detour else []
+    useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
+    ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
+    fixes = [to_fix(case.query, *settled(case.query, assignment)) for assignment, _probability in ranked]
+    return [fix for i, fix in enumerate(fixes) if fix.changes not in [earlier.changes for earlier in fixes[:i]]]
+
+
+def _as_promised(found: Sequence[tuple[Assignment, float]], promise: Promise) -> list[tuple[Assignment, float]]:
+    """The sets that the search found with what they promise for the next run."""
+    if not found:
+        return []
+    odds = promise.odds([{**promise.query.config, **assignment} for assignment, _ in found])
+    return [(assignment, float(share)) for (assignment, _), share in zip(found, odds, strict=True)]
+
+
+def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:
+    """Whether an operator might prefer it: likely enough, and not the same changes with one more for nothing."""
+    adds_for_nothing = chosen[0].keys() <= other[0].keys() and other[1] < chosen[1] + MIN_CONTRIBUTION
+    return other[1] >= MIN_PROBABILITY and not adds_for_nothing
+
+
+def _has_effect(case: FailedRun, option: str) -> bool:
+    effects = case.query.model.effects
+    return any(effects[key].identified and effects[key].effect > 0 for key in effects if key[0] == option)
+
+
+def _idle(judged: Judged, fixes: Sequence[Fix], promise: Promise) -> set[str]:
+    """Options that a fix changes beside others for nothing that this run broke: it met all else, as far as can be."""
+    if not fixes or any(result.status == "not_evaluated" for result in judged.results):
+        return set()
+    names = {change.option.name for change in fixes[0].changes}
+    return {
+        name for name in names if len(names) > 1 and _necessary(promise, fixes[0], names - {name}) < NECESSARY.value
+    }
+
+
+def _necessary(promise: Promise, fix: Fix, given: Collection[str] = frozenset()) -> float:
+    """Probability of necessity of a fix. `given`: options of it that are changed already."""
+    driven = promise.query.config
+    changed = {one.option.name: one.suggested for one in fix.changes}
+    first = {name: value for name, value in changed.items() if name in given}
+    return promise.necessity({**driven, **changed}, {**driven, **first})
+
+
+def _leads(faults: Sequence[Fault]) -> set[str]:
+    """Options that are only not ruled out: no fix changes them."""
+    causes = [cause for fault in faults for cause in fault.causes]
+    return {one.option.name for one in causes if one.is_lead} - {one.option.name for one in causes if not one.is_lead}
+
+
+def _abstains(
+    case: FailedRun, faults: tuple[Fault, ...], fixes: Sequence[Fix], held: Collection[str], promise: Promise
+) -> str | None:
+    as_driven = promise.as_driven()
+    names = [fault.objective.variable.name for fault in faults]
+    unknown = [name for name in names if name not in case.query.model.outcomes]
+    if unknown:
+        return f"too few training missions to predict {', '.join(unknown)}: the causes are named, no change is promised"
+    for fault in faults:
+        rival = next(iter(case.unranked[fault.objective.variable.name]), None)
+        if rival is not None and rival.weight > max((cause.contribution for cause in fault.causes), default=0.0):
+            return f"'{rival.option}' is as likely a cause, and the training runs cannot tell what it does"
+    has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
+    if has_cause and fixes and is_worth(fixes[0], as_driven):
+        return None
+    if any(cause.option.name in held for fault in faults for cause in fault.causes if not cause.is_lead):
+        return f"charge or replace the battery first: {', '.join(sorted(held))} is not lowered while it is not full"
+    now = float(case.query.probability([case.query.config])[0])
+    unsafe = needs_unsafe(case.query, max(MIN_PROBABILITY, now + WORTH.value))
+    if unsafe is not None:
+        return f"only '{unsafe}' past its default is likely to help, and a safety parameter is never made looser"
+    if not case.run.config:
+        return "not one of the parameters that this profile knows is in the log, and no file tells them"
+    if not has_cause:
+        return (
+            "no parameter that this profile models explains the fault: look at what the run met "
+            "(wind, battery, positioning, obstacles) or at parameters outside the profile"
+        )
+    pinned = f", with {', '.join(sorted(case.query.kept))} kept as it is" if case.query.kept else ""
+    broken = [fault.objective for fault in faults]
+    best = nearest(promised(_resets(case, faults), promise), broken)
+    short = falls_short(best, broken, as_driven) if best else None
+    return f"{short or 'no change inside the acceptable ranges is likely enough to meet every limit'}{pinned}"
+
+
+def _resets(case: FailedRun, faults: tuple[Fault, ...]) -> list[Fix]:
+    """Each named cause back at its reference, and all of them: where every probability is about zero, what comes
+    nearest to the limits is told by its values."""
+    query = case.query
+    named = dict.fromkeys(cause.option.name for fault in faults for cause in fault.causes if not cause.is_lead)
+    free = [name for name in named if name not in query.kept and query.config[name] != query.reference[name]]
+    sets = [[name] for name in free] + ([free] if len(free) > 1 else [])
+    resets = [{name: query.reference[name] for name in names} for names in sets]
+    return [to_fix(query, one, float(query.probability([{**query.config, **one}])[0])) for one in resets]
+
+
+def _shown_by_run(case: FailedRun, hypotheses: Sequence[Hypothesis]) -> Fix | None:
+    """The parameters that a critical finding of this run names, back at their reference: what it shows is worth a
+    change where training says little of it, though nothing says what that promises. None where none stands above
+    chance."""
+    query, shown = case.query, next((one for one in case.run.evidence if one.kind == "found"), None)
+    if shown is None or case.profile.schema.learned_elsewhere:
+        return None
+    chance = sum(one.probability for one in hypotheses if one.what == "chance")
+    likely = {one.name for one in hypotheses if one.what == "parameter" and one.probability > chance}
+    back = {name: query.reference[name] for name in shown.options if name not in query.kept}
+    if not likely & back.keys() or not all(query.variables[name].accepts(value) for name, value in back.items()):
+        return None
+    fix = to_fix(query, back, float(query.probability([{**query.config, **back}])[0]))
+    return replace(fix, predicted={}, shown_by=shown.text.partition(":")[0])
+
+
+def all_back(case: FailedRun, promise: Promise, advised: float) -> AllBack | None:
+    """Everything at its reference, where that promises more than the advised change, by as much as is worth one."""
+    query, held = case.query, failsafes_held(case, case.findings)
+    off = sorted(case.off - query.kept - held)
+    back = {name: value for name in off if query.variables[name].accepts(value := query.reference[name])}
+    if len(back) < 2 or case.profile.schema.learned_elsewhere:
+        return None
+    odds = float(promise.odds([{**query.config, **back}])[0])
+    return AllBack(len(back), odds) if odds >= max(advised + WORTH.value, MIN_PROBABILITY) else None
+
+
+def part_first(case: FailedRun, findings: Sequence[Finding]) -> Finding | None:
+    """The part that comes before any parameter. A battery that is known to be full kept no vehicle from arming."""
+    part = mend_first(findings)
+    is_full = battery_is_low(case.run, case.query.model, case.profile.schema) is False
+    return None if part is not None and part.kind == "prearm" and is_full else part
+
+
+def failsafes_held(case: FailedRun, findings: Sequence[Finding]) -> frozenset[str]:
+    """The battery failsafes, where the battery may not have been full or well: they are lowered for no such flight."""
+    suspected = any(
+        one.kind == "battery" and one.suspect != "parameter" and one.severity != "info" and not one.after_impact
+        for one in every_finding(findings)
+    )
+    if not suspected and not battery_is_low(case.run, case.query.model, case.profile.schema):
+        return frozenset()
+    return frozenset(one.name for one in case.profile.schema.options if one.safety and one.unit == "V")

@@ -1,0 +1,78 @@
+"""What has to be known of a diagnosis beside its causes and its fix: what it was held against, what is not known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from care_core.causal.counterfactual import CounterfactualQuery
+from care_core.diagnose.advice import by_chance
+from care_core.diagnose.failed_run import FailedRun
+from care_core.diagnose.implied import implied
+from care_core.diagnose.judging import Judged, unread_options
+from care_core.diagnose.ranking import deviating
+from care_core.diagnose.records import Fix, ObjectiveResult
+from care_core.records import replace
+
+
+def reference_of(judged: Judged) -> str:
+    """Whose configuration the run was judged against, and how far from it it was driven."""
+    off = len(deviating(judged.run.config, judged.reference.config))
+    count = f"{off} parameter differs" if off == 1 else f"{off} parameters differ"
+    return f"compared with {judged.reference.source}; {count}"
+
+
+def notes_of(case: FailedRun, broken: Sequence[ObjectiveResult], fix: Fix | None, as_driven: float) -> tuple[str, ...]:
+    notes = [case.reference]
+    for name in (result.variable.name for result in broken):
+        unknown = ", ".join(suspect.option for suspect in case.unranked[name])
+        if unknown:
+            notes.append(f"not ranked, as the training runs cannot tell their effect on {name}: {unknown}")
+    notes += [
+        f"no mechanism predicts {name}: it counts with its base rate, {rate:.0%} of the training missions"
+        for name, rate in case.query.base_rates().items()
+    ]
+    notes.append(_promise(case.query, [result.variable.name for result in broken]))
+    if fix is not None and not fix.shown_by:
+        notes += filter(None, [by_chance(fix, as_driven, _odds(case.query))])
+    if fix is not None and not fix.shown_by and case.profile.schema.observational:
+        notes.append(_if_hidden(case, fix, as_driven))
+    if not case.run.mission.fits and case.run.mission.mismatch not in notes:
+        notes.append(case.run.mission.mismatch)
+    unread = unread_options(case.profile.schema, case.run) & set(case.off)
+    if unread:
+        named = ", ".join(option.name for option in case.profile.schema.options if option.name in unread)
+        notes.append(f"no suspect, as no mode that reads it was entered: {named}")
+    spoken_for = implied(case.run, case.profile.schema, case.profile.model, case.query.reference)
+    notes += map(str, spoken_for.values())
+    if names := sorted(case.query.assumed - spoken_for.keys()):
+        shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+        notes.append(f"not in the log, taken to be at their reference: {shown}")
+    return tuple(notes)
+
+
+def _promise(query: CounterfactualQuery, broken: Sequence[str]) -> str:
+    """Which next run the probabilities are for, and what is known of how it resembles this one."""
+    known = [query.model.training.carry_over[name] for name in broken if name in query.model.training.carry_over]
+    same, another = (max((carry_over.pairs[i] for carry_over in known), default=0) for i in (0, 1))
+    measured = f"measured on {same} pairs of training runs" if same else "not measured"
+    if another and not same:
+        measured = f"measured only between days ({another} pairs of training runs)"
+    seen = f", seen in {1 + len(query.repeats)} runs" if query.repeats else ""
+    return f"these odds assume similar conditions{seen}; run-to-run variation was {measured}"
+
+
+def _odds(query: CounterfactualQuery) -> float:
+    """Probability that the reference configuration meets every limit in a mission like this, whatever this run met."""
+    return float(replace(query, observed={}, repeats=()).probability([query.reference])[0])
+
+
+def _if_hidden(case: FailedRun, fix: Fix, now: float) -> str:
+    """What is left of a fix's promise where something unrecorded moved options and objectives together."""
+    names = {change.option.name for change in fix.changes}
+    effects = [effect for (option, _), effect in case.query.model.effects.items() if option in names]
+    doubt = max((effect.doubtful for effect in effects), default=1.0)
+    left = min(fix.p_fixed, now + (1.0 - doubt) * (fix.p_fixed - now))
+    return (
+        f"operators chose the parameters of the training runs: the fix has {fix.p_fixed:.0%} if nothing unrecorded "
+        f"made them choose so, {left:.0%} if something as strong as the strongest recorded cause did"
+    )
