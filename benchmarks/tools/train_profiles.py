@@ -69,9 +69,8 @@ SOURCES = {
     "quadplane": Source(
         ("data/quadplane/table.tar.xz",),
         "Missions of the ArduPlane V4.5.4 firmware with a QuadPlane in its software-in-the-loop simulator, recorded by "
-        "this project under random configurations and winds: those of 392 flights of 33 settings (mission, QuadPlane, "
-        "site) in which no hardware failed; DataFlash logs, read by `care ingest`.",
-        hardware="data/quadplane/table.csv",
+        "this project under random configurations, in half of them one to three options off, and winds: 354 flights of "
+        "33 settings (mission, QuadPlane, site) in which no hardware failed; DataFlash logs, read by `care ingest`.",
     ),
     "ardusub": Source(
         ("data/sub/table.tar.xz",),

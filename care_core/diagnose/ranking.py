@@ -40,12 +40,12 @@ class Suspect(Record):
     not_borne_out: tuple[str, ...] = ()
     """Metrics on the path that were better in this run than the reference would give."""
     by_physics: bool = False
-    """Whether what physics says of the objective reads the option, where training found no path."""
+    """Whether what physics says of the objective reads the option, where training found no path by way of a metric."""
 
     @property
     def is_identified(self) -> bool:
         """Whether the training runs can tell what the option does: if not, what it costs may be another's doing."""
-        return self.effect is None or self.effect.identified
+        return self.by_physics or self.effect is None or self.effect.identified
 
     @property
     def total_effect(self) -> float:
@@ -79,7 +79,7 @@ def suspects(
     better = better_than_expected(query, objective)
     paths = best_paths(query.model, objective, off, _mediators(query) - better)
     physics = {name: CausalPath((name, objective), 0.0) for name in _in_physics(query.model, objective, off)}
-    by_physics = physics.keys() - paths.keys()
+    by_physics = {name for name in physics if len(paths.get(name, physics[name]).nodes) == 2}
     paths = physics | paths
     effects = {name: query.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
@@ -214,7 +214,6 @@ def describe_path(
     for i, name in enumerate(path.nodes):
         value = run.value(name)
         edge = query.model.edges.get(path.edges[i]) if i < len(path.edges) else None
-        is_unknown = edge is None and not by_physics and i < len(path.edges)
         nodes.append(
             PathNode(
                 name=name,
@@ -222,7 +221,7 @@ def describe_path(
                 value=value if is_known(value) else None,
                 expected=_expected(name, query),
                 effect=None if edge is None else edge.signed_effect,
-                support=0.0 if is_unknown else None if edge is None else edge.support,
+                support=None if by_physics or i == len(path.edges) else 0.0 if edge is None else edge.support,
             )
         )
     return tuple(nodes)
