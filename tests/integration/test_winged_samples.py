@@ -1,4 +1,4 @@
-"""What a QuadPlane's operator asks of a mission that took too long: hardly a resample finds the cause, physics has it."""
+"""A mission of a QuadPlane that took too long: hardly a resample finds the cause, physics has it."""
 
 from __future__ import annotations
 
