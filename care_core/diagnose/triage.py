@@ -130,7 +130,7 @@ def diagnose(
     if abstained is None and lead is None:
         faults = tuple(replace(fault, causes=as_in_fix(case, fault, fixes[0])) for fault in faults)
     faults = as_ranked(promised_causes(faults, promise), failure)
-    everything = all_back(case, promise, as_driven if abstained or fixes[0].odds is None else fixes[0].odds)
+    advised_odds = as_driven if abstained or fixes[0].odds is None else fixes[0].odds
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
@@ -145,7 +145,9 @@ def diagnose(
         notes=notes_of(case, broken, None if abstained or lead else fixes[0], as_driven),
         missions=judged.missions,
         rivals=circumstances(run, query, schema) if unsure else (),
-        tell_more=_tell_more(case, faults, health, everything) if unsure and not beyond else (),
+        tell_more=_tell_more(case, faults, health, all_back(case, promise, advised_odds))
+        if unsure and not beyond
+        else (),
         health=health,
         hypotheses=hypotheses,
         failure=failure,

@@ -129,10 +129,13 @@ def test_a_transition_of_a_quadplane(done_s: float | None, is_slow: bool) -> Non
     assert told == ["the transition to the wings takes too long"] * is_slow
 
 
+@pytest.mark.parametrize("pulse_most", [2000.0, 0.0])
 @pytest.mark.parametrize(("spin_most", "suspect"), [(0.6, "parameter"), (0.95, "hardware")])
-def test_a_quadplane_that_stays_on_the_ground_with_all_its_lift(spin_most: float, suspect: str) -> None:
+def test_a_quadplane_that_stays_on_the_ground_with_all_its_lift(
+    spin_most: float, suspect: str, pulse_most: float
+) -> None:
     flown = MadePlane()
-    flown.settings |= {"Q_ENABLE": 1, "Q_M_SPIN_MAX": spin_most}
+    flown.settings |= {"Q_ENABLE": 1, "Q_M_SPIN_MAX": spin_most, "Q_M_PWM_MAX": pulse_most}
     for name in ("POS", "GPS"):
         for field, standing in flown.table[name].items():
             flown.table[name][field] = np.full(len(standing), standing[0])

@@ -77,7 +77,7 @@ def _kept(flight: Flight) -> _Kept | None:
         value, left = flight.setting(name), flight.default_left(name)
         shipped = left or usual
         idle = _PWM_MIN if name.endswith("PWM_MAX") else 0.0
-        if value is not None and shipped > idle:
+        if value and shipped > idle:  # a pulse of 0 leaves the range to the receiver's
             found.append(_Kept(name, value, shipped, (value - idle) / (shipped - idle)))
     least = min(found, key=lambda one: one.share, default=None)
     return least if least is not None and least.share < _KEPT else None
