@@ -30,7 +30,7 @@ from benchmarks.diagnosis import abducted
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
-from care_core.diagnose.advising import MIN_PROBABILITY
+from care_core.diagnose.advice import MIN_PROBABILITY
 from care_core.diagnose.ranking import deviating, suspects
 from care_core.diagnose.reference import profile_config
 from care_core.learn.baselines import PlainClassifier

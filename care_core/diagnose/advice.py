@@ -1,216 +1,268 @@
-"""Which of the fixes that were found is advised, if any: by what it adds to the odds of running the mission again."""
+"""What is advised of a failed run: the fixes, the advised one first, or why none is."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
-from care_core.diagnose.estimates import CHANCY, COST, NECESSARY, WORTH
-from care_core.diagnose.parts import LATE_S, set_wrong
+from care_core.diagnose.causes import MIN_CONTRIBUTION
+from care_core.diagnose.circumstances import battery_is_low
+from care_core.diagnose.estimates import NECESSARY, WORTH
+from care_core.diagnose.failed_run import FailedRun
+from care_core.diagnose.fixes import (
+    GAIN_FOR_ONE_MORE,
+    MAX_ALTERNATIVES,
+    Assignment,
+    needs_unsafe,
+    search,
+    settled,
+    smallest_good,
+    to_fix,
+)
+from care_core.diagnose.judging import Judged
+from care_core.diagnose.next_step import was_refused
+from care_core.diagnose.outside.change import Advisable, check_first, outside_fix
+from care_core.diagnose.parts import mend_first
 from care_core.diagnose.promise import Promise
-from care_core.diagnose.records import Cause, Fault, Fix, Hypothesis, ObjectiveResult
-from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ranking import LIKELY
-from care_core.records import replace
-from care_core.run import FitVerdict
-from care_core.text import log_time, percent
-from care_core.variables import Change
+from care_core.diagnose.ranking import deviating
+from care_core.diagnose.records import Fault, Fix, Hypothesis
+from care_core.diagnose.tell_more import AllBack
+from care_core.diagnose.worth import falls_short, is_worth, nearest, no_stand_out, promised, unrecorded, untried
+from care_core.ecosystems.findings import Finding, every_finding
+from care_core.records import Record, replace
 
-TOLD_APART = 4.0
-"""How many times likelier good runs have to be with the change than without for it to be known that it works."""
-MOST_RUNS = 10
-"""More than so many runs in a row nobody makes to know."""
-
-LITTLE = 0.5
-"""Share of its cause's probability below which what a change adds has to be explained."""
-ALIKE = 0.02
-"""Shares of a limit that are no difference to an operator."""
+BESIDE = 0.3
+"""Share of the leading parameter's probability from which an option is changed with it."""
+MIN_PROBABILITY = 0.2
+"""Best probability below which the engine abstains: a confident wrong answer costs a field day."""
 
 
-def promised(fixes: Sequence[Fix], promise: Promise) -> tuple[Fix, ...]:
-    """The fixes of the profile's options with what they promise for the next run."""
-    if not fixes:
-        return ()
+class Advised(Record):
+    """The fixes, the advised one first, or why none is advised."""
+
+    fixes: Sequence[Fix]
+    abstained: str | None
+    why: str = ""
+
+
+def of_outside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothesis], promise: Promise) -> Advised:
+    """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside it.
+    A vehicle that never armed has its mission still before it: then the odds are those of the mission, too."""
+    if not lead.is_advised:
+        return Advised((), check_first(lead))
+    query = failed.query
+    beside = _beside(lead, failed, hypotheses, promise)
+    odds = promise.without(lead.name, {**query.config, **beside})
+    if was_refused(failed.findings):
+        odds *= float(replace(query, observed={}, repeats=()).probability([query.config])[0])
+    changes = to_fix(query, beside, odds).changes if beside else ()
+    return Advised((outside_fix(lead, odds, failed.run, changes),), None, lead.why)
+
+
+def _beside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothesis], promise: Promise) -> dict[str, float]:
+    """The options that go back to their reference with a parameter outside the profile: those that are about as likely,
+    and those without which its change promises much less."""
+    query = failed.query
+    likely = {one.name for one in hypotheses if one.what == "parameter" and one.acts >= BESIDE * lead.probability}
+    off = failed.off - query.kept - failsafes_held(failed, failed.findings)
+    free = {name: value for name in sorted(off) if query.variables[name].accepts(value := query.reference[name])}
+    chosen = {name: value for name, value in free.items() if name in likely}
+    while rest := free.keys() - chosen:
+        now = promise.without(lead.name, {**query.config, **chosen})
+        odds = {name: promise.without(lead.name, {**query.config, **chosen, name: free[name]}) for name in sorted(rest)}
+        best = max(odds, key=lambda name: odds[name])
+        if odds[best] < now + GAIN_FOR_ONE_MORE:
+            break
+        chosen[best] = free[best]
+    return chosen
+
+
+def of_options(
+    failed: FailedRun,
+    judged: Judged,
+    faults: tuple[Fault, ...],
+    hypotheses: Sequence[Hypothesis],
+    options: Collection[str],
+    promise: Promise,
+    against: str | None,
+) -> Advised:
+    """What is advised of the options of the profile.
+
+    Args:
+        options: those that may have moved what broke.
+        against: why nothing is advised whatever is found, None where nothing stands against it.
+    """
+    broken, as_driven = judged.broken, promise.as_driven()
+    held = failsafes_held(failed, failed.findings)
+    held_too = held | _leads(faults)
+    found = _fixes(failed, options, held_too, promise)
+    if idle := _idle(judged, found[:1], promise):
+        found = _fixes(failed, options, held_too | idle, promise)
+    fixes = promised(found, promise)
+    if against is not None:
+        return Advised(fixes, against)
+    abstained = (
+        _abstains(failed, faults, fixes, held, promise)
+        or falls_short(fixes[0], broken, as_driven)
+        or untried(fixes[0], failed.profile.schema.learned_elsewhere)
+        or unrecorded(fixes[0], failed.choice.fit.verdict)
+        or no_stand_out(fixes[0], as_driven, hypotheses, _necessary(promise, fixes[0]))
+    )
+    shown = None if abstained is None else _shown_by_run(failed, hypotheses)
+    return Advised(fixes, abstained) if shown is None else Advised((shown,), None)
+
+
+def _fixes(failed: FailedRun, options: Collection[str], held: Collection[str], promise: Promise) -> list[Fix]:
+    """The suggested fix first, then up to three that trade changes for probability or take another way.
+
+    Args:
+        held: options that are not changed.
+    """
+    # Options off their reference that break another objective matter too once this fault is gone.
+    off = deviating(failed.query.config, failed.query.reference)
+    free = sorted({*options, *(name for name in off if _has_effect(failed, name))} - {*held, *failed.query.kept})
+    found = _as_promised(search(failed.query, free), promise)
+    if not found:
+        return []
+    chosen = smallest_good(found)
+    others = [found[i] for i in range(len(found)) if i != chosen and abs(i - chosen) == 1]
+    without = [name for name in free if name not in found[chosen][0]]
+    detour = _as_promised(search(failed.query, without), promise)
+    others += [detour[smallest_good(detour)]] if detour else []
+    useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
+    ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
+    fixes = [to_fix(failed.query, *settled(failed.query, assignment)) for assignment, _probability in ranked]
+    return [fix for i, fix in enumerate(fixes) if fix.changes not in [earlier.changes for earlier in fixes[:i]]]
+
+
+def _as_promised(found: Sequence[tuple[Assignment, float]], promise: Promise) -> list[tuple[Assignment, float]]:
+    """The sets that the search found with what they promise for the next run."""
+    if not found:
+        return []
+    odds = promise.odds([{**promise.query.config, **assignment} for assignment, _ in found])
+    return [(assignment, float(share)) for (assignment, _), share in zip(found, odds, strict=True)]
+
+
+def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:
+    """Whether an operator might prefer it: likely enough, and not the same changes with one more for nothing."""
+    adds_for_nothing = chosen[0].keys() <= other[0].keys() and other[1] < chosen[1] + MIN_CONTRIBUTION
+    return other[1] >= MIN_PROBABILITY and not adds_for_nothing
+
+
+def _has_effect(failed: FailedRun, option: str) -> bool:
+    effects = failed.query.model.effects
+    return any(effects[key].identified and effects[key].effect > 0 for key in effects if key[0] == option)
+
+
+def _idle(judged: Judged, fixes: Sequence[Fix], promise: Promise) -> set[str]:
+    """Options that a fix changes beside others for nothing that this run broke: it met all else, as far as can be."""
+    if not fixes or any(result.status == "not_evaluated" for result in judged.results):
+        return set()
+    names = {change.option.name for change in fixes[0].changes}
+    return {
+        name for name in names if len(names) > 1 and _necessary(promise, fixes[0], names - {name}) < NECESSARY.value
+    }
+
+
+def _necessary(promise: Promise, fix: Fix, given: Collection[str] = frozenset()) -> float:
+    """Probability of necessity of a fix. `given`: options of it that are changed already."""
     driven = promise.query.config
-    configs = [{**driven, **{one.option.name: one.suggested for one in fix.changes}} for fix in fixes]
-    odds = map(float, promise.odds(configs))
-    return tuple(
-        replace(fix, p_fixed=share, changes=_likeliest_first(fix, promise))
-        for fix, share in zip(fixes, odds, strict=True)
-    )
+    changed = {one.option.name: one.suggested for one in fix.changes}
+    first = {name: value for name, value in changed.items() if name in given}
+    return promise.necessity({**driven, **changed}, {**driven, **first})
 
 
-def _likeliest_first(fix: Fix, promise: Promise) -> tuple[Change, ...]:
-    """The changes in the order of how likely what they change acted: of several the first is the one that is read."""
-    acts = {one.option.name: promise.failure.acts(("parameter", one.option.name)) for one in fix.changes}
-    return tuple(sorted(fix.changes, key=lambda one: -round(acts[one.option.name], 2)))
+def _leads(faults: Sequence[Fault]) -> set[str]:
+    """Options that are only not ruled out: no fix changes them."""
+    causes = [cause for fault in faults for cause in fault.causes]
+    return {one.option.name for one in causes if one.is_lead} - {one.option.name for one in causes if not one.is_lead}
 
 
-def promised_causes(faults: Sequence[Fault], promise: Promise) -> tuple[Fault, ...]:
-    """The faults with what each cause promises where only that is changed."""
-
-    def alone(cause: Cause) -> Cause:
-        if cause.p_fixed is None or cause.suggested is None:
-            return cause
-        changed = {**promise.query.config, cause.option.name: cause.suggested}
-        return replace(cause, p_fixed=float(promise.odds([changed])[0]))
-
-    return tuple(replace(fault, causes=tuple(map(alone, fault.causes))) for fault in faults)
-
-
-def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = ()) -> str | None:
-    """Why no parameter is to be changed, where something else explains the failure better than all of them together.
-
-    A part that, by no sure sign, failed well after the robot was failing by how it was set may be what that led to:
-    motors at their limit for an oscillation have too little thrust. Then it is not what to look at first.
-    """
-    rival = next((one for one in hypotheses if one.what in ("hardware", "world") and one.name), None)
-    parameters = sum(one.probability for one in hypotheses if one.what == "parameter" and one.name)
-    if rival is None or rival.probability <= parameters:
+def _abstains(
+    failed: FailedRun, faults: tuple[Fault, ...], fixes: Sequence[Fix], held: Collection[str], promise: Promise
+) -> str | None:
+    as_driven = promise.as_driven()
+    names = [fault.objective.variable.name for fault in faults]
+    unknown = [name for name in names if name not in failed.query.model.outcomes]
+    if unknown:
+        return f"too few training missions to predict {', '.join(unknown)}: the causes are named, no change is promised"
+    for fault in faults:
+        rival = next(iter(failed.unranked[fault.objective.variable.name]), None)
+        if rival is not None and rival.weight > max((cause.contribution for cause in fault.causes), default=0.0):
+            return f"'{rival.option}' is as likely a cause, and the training runs cannot tell what it does"
+    has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
+    if has_cause and fixes and is_worth(fixes[0], as_driven):
         return None
-    doubtful = (one for one in findings if one.title == rival.name and one.probability < LIKELY)
-    since_s = min((one.onset_s for one in doubtful), default=-math.inf)
-    sooner = [one for one in findings if set_wrong(one) and one.onset_s + LATE_S < since_s]
-    if sooner:
-        earliest = min(sooner, key=lambda one: one.onset_s)
+    if any(cause.option.name in held for fault in faults for cause in fault.causes if not cause.is_lead):
+        return f"charge or replace the battery first: {', '.join(sorted(held))} is not lowered while it is not full"
+    now = float(failed.query.probability([failed.query.config])[0])
+    unsafe = needs_unsafe(failed.query, max(MIN_PROBABILITY, now + WORTH.value))
+    if unsafe is not None:
+        return f"only '{unsafe}' past its default is likely to help, and a safety parameter is never made looser"
+    if not failed.run.config:
+        return "not one of the parameters that this profile knows is in the log, and no file tells them"
+    if not has_cause:
         return (
-            f"{earliest.title} from {log_time(earliest.onset_s, 0)} on, before {rival.name}: that speaks of how the "
-            "robot is set, and training does not tell which parameter does it"
+            "no parameter that this profile models explains the fault: look at what the run met "
+            "(wind, battery, positioning, obstacles) or at parameters outside the profile"
         )
-    return f"{rival.name}; that explains this failure better than any parameter: look at it first"
+    pinned = f", with {', '.join(sorted(failed.query.kept))} kept as it is" if failed.query.kept else ""
+    broken = [fault.objective for fault in faults]
+    best = nearest(promised(_resets(failed, faults), promise), broken)
+    short = falls_short(best, broken, as_driven) if best else None
+    return f"{short or 'no change inside the acceptable ranges is likely enough to meet every limit'}{pinned}"
 
 
-def nearest(fixes: Sequence[Fix], broken: Sequence[ObjectiveResult]) -> Fix | None:
-    """The smallest fix whose predicted values exceed the limits about least, as shares of them; None without any."""
-
-    def excess(fix: Fix) -> float:
-        return sum(max(0.0, _beyond(fix, result)) for result in broken)
-
-    least = min(map(excess, fixes), default=0.0)
-    near = [fix for fix in fixes if excess(fix) <= least + ALIKE]
-    return min(near, key=lambda fix: len(fix.changes), default=None)
-
-
-def _beyond(fix: Fix, result: ObjectiveResult) -> float:
-    predicted, bound = fix.predicted.get(result.variable.name), result.threshold
-    if predicted is None or bound is None or result.variable.kind == "functional":
-        return 0.0
-    sign = 1.0 if bound.op in ("<=", "<") else -1.0
-    return sign * (predicted.value - bound.bound) / (abs(bound.bound) or 1.0)
+def _resets(failed: FailedRun, faults: tuple[Fault, ...]) -> list[Fix]:
+    """Each named cause back at its reference, and all of them: where every probability is about zero, what comes
+    nearest to the limits is told by its values."""
+    query = failed.query
+    named = dict.fromkeys(cause.option.name for fault in faults for cause in fault.causes if not cause.is_lead)
+    free = [name for name in named if name not in query.kept and query.config[name] != query.reference[name]]
+    sets = [[name] for name in free] + ([free] if len(free) > 1 else [])
+    resets = [{name: query.reference[name] for name in names} for names in sets]
+    return [to_fix(query, one, float(query.probability([{**query.config, **one}])[0])) for one in resets]
 
 
-def no_stand_out(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], necessary: float) -> str | None:
-    """Why a fix is not advised that changes no cause which stands in the ranking, else None.
-
-    Args:
-        as_driven: probability that the next run meets every limit without it, as the fix's.
-        necessary: share of this configuration's failures that it takes away.
-    """
+def _shown_by_run(failed: FailedRun, hypotheses: Sequence[Hypothesis]) -> Fix | None:
+    """The parameters that a critical finding of this run names, back at their reference: what it shows is worth a
+    change where training says little of it, though nothing says what that promises. None where none stands above
+    chance."""
+    query, shown = failed.query, next((one for one in failed.run.evidence if one.kind == "found"), None)
+    if shown is None or failed.profile.schema.learned_elsewhere:
+        return None
     chance = sum(one.probability for one in hypotheses if one.what == "chance")
-    changed = {change.option.name for change in fix.changes}
-    leader = _leader(hypotheses)
-    is_cause = any(one.name in changed and one.probability > chance for one in hypotheses if one.what == "parameter")
-    if is_cause and (leader in changed or necessary >= NECESSARY.value):
+    likely = {one.name for one in hypotheses if one.what == "parameter" and one.probability > chance}
+    back = {name: query.reference[name] for name in shown.options if name not in query.kept}
+    if not likely & back.keys() or not all(query.variables[name].accepts(value) for name, value in back.items()):
         return None
-    odds = f"with {_changes(fix)} the odds are {percent(fix.p_fixed)}, as driven {percent(as_driven)}"
-    return f"no parameter stands out: {odds}, and nothing in this run says that it was the cause"
+    fix = to_fix(query, back, float(query.probability([{**query.config, **back}])[0]))
+    return replace(fix, predicted={}, shown_by=shown.text.partition(":")[0])
 
 
-def explained(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], faults: Sequence[Fault]) -> str:
-    """Why another parameter is changed than the likeliest cause, or why the change of a likely one adds little; empty
-    where neither is so."""
-    leader = _leader(hypotheses)
-    weight = next((one.probability for one in hypotheses if leader and one.name == leader), 0.0)
-    if leader and leader not in {change.option.name for change in fix.changes}:
-        alone = next((c.p_fixed for fault in faults for c in fault.causes if c.option.name == leader), None)
-        does = "no acceptable value of it" if alone is None else f"changing only that has {percent(alone)}"
-        return f"{leader} is the likelier cause ({percent(weight)}), but {does}"
-    if leader and fix.p_fixed - as_driven < LITTLE * weight:
-        by_chance_alone = as_driven >= fix.p_fixed / 2
-        but = "a run as driven may go well by chance" if by_chance_alone else "its change may not be all that it takes"
-        return f"{leader} explains {percent(weight)}, but {but}"
-    return ""
-
-
-def _leader(hypotheses: Sequence[Hypothesis]) -> str:
-    """The likeliest parameter, empty where none is told."""
-    return next((one.name for one in hypotheses if one.what == "parameter" and one.name), "")
-
-
-def _changes(fix: Fix) -> str:
-    return ", ".join(map(str, fix.changes))
-
-
-def untried(fix: Fix, learned_elsewhere: str) -> str | None:
-    """Why a fix is not advised that rests on other robots alone, with what it suspects, else None."""
-    if not learned_elsewhere:
+def all_back(failed: FailedRun, promise: Promise, advised: float) -> AllBack | None:
+    """Everything at its reference, where that promises more than the advised change, by as much as is worth one."""
+    query, held = failed.query, failsafes_held(failed, failed.findings)
+    off = sorted(failed.off - query.kept - held)
+    back = {name: value for name in off if query.variables[name].accepts(value := query.reference[name])}
+    if len(back) < 2 or failed.profile.schema.learned_elsewhere:
         return None
-    suspected = ", ".join(change.option.name for change in fix.changes)
-    return f"{learned_elsewhere}, so no change is advised; look at {suspected}, and carry it over with 'care update'"
+    odds = float(promise.odds([{**query.config, **back}])[0])
+    return AllBack(len(back), odds) if odds >= max(advised + WORTH.value, MIN_PROBABILITY) else None
 
 
-def unrecorded(fix: Fix, verdict: FitVerdict) -> str | None:
-    """Why a fix is not advised that changes what the log does not hold, where the profile fits only in part."""
-    names = [change.option.name for change in fix.changes if change.is_assumed]
-    if verdict == "fits" or not names:
-        return None
-    return f"the log does not hold {', '.join(names)}: record it, or name the configuration with --config"
+def part_first(failed: FailedRun, findings: Sequence[Finding]) -> Finding | None:
+    """The part that comes before any parameter. A battery that is known to be full kept no vehicle from arming."""
+    part = mend_first(findings)
+    is_full = battery_is_low(failed.run, failed.query.model, failed.profile.schema) is False
+    return None if part is not None and part.kind == "prearm" and is_full else part
 
 
-def adds_enough(odds: float, as_driven: float, changes: int) -> bool:
-    """Whether so many changes add enough to the odds of running the same mission again, whatever those are: on robots
-    that fail by chance no change is sure."""
-    return odds - COST.value * changes - as_driven >= WORTH.value
-
-
-def is_worth(fix: Fix, as_driven: float) -> bool:
-    """Whether a fix adds enough to the odds as driven."""
-    return adds_enough(fix.p_fixed, as_driven, len(fix.changes))
-
-
-def falls_short(fix: Fix, broken: Sequence[ObjectiveResult], as_driven: float) -> str | None:
-    """Why a fix is not advised that adds too little, with what it reaches, else None."""
-    if is_worth(fix, as_driven):
-        return None
-    reached = "; ".join(filter(None, (_reached(fix, result) for result in broken)))
-    limit = f"; with it {reached}" if reached else ""
-    best = f"the best found, {_changes(fix)}, has {percent(fix.p_fixed)}, as driven {percent(as_driven)}"
-    return f"no change adds enough to the odds of meeting every limit: {best}{limit}"
-
-
-def by_chance(fix: Fix, now: float, odds: float) -> str | None:
-    """What an operator has to know of a change where the reference configuration misses limits too, else None.
-
-    Args:
-        now: probability that the next run meets every limit as driven.
-        odds: probability that a run with the reference settings does, before anything of this run is known.
-    """
-    if odds >= CHANCY.value:
-        return None
-    runs = MOST_RUNS + 1 if fix.p_fixed <= now else math.ceil(math.log(TOLD_APART) / math.log(fix.p_fixed / now))
-    times = "once" if runs == 1 else f"{runs} times"
-    to_know = f"run it {times} to know" if runs <= MOST_RUNS else "no few runs tell whether it helped"
-    return (
-        f"such missions fail by chance too, {_in_five(odds)} with the reference settings: this configuration fails "
-        f"{_in_five(now)}, with the change {_in_five(fix.p_fixed)}; {to_know}"
+def failsafes_held(failed: FailedRun, findings: Sequence[Finding]) -> frozenset[str]:
+    """The battery failsafes, where the battery may not have been full or well: they are lowered for no such flight."""
+    suspected = any(
+        one.kind == "battery" and one.suspect != "parameter" and one.severity != "info" and not one.after_impact
+        for one in every_finding(findings)
     )
-
-
-def _in_five(odds: float) -> str:
-    """Failures in a few missions, in words that nobody takes for more than they are."""
-    lost = 1.0 - odds
-    few = min(range(2, 11), key=lambda n: abs(round(lost * n) / n - lost) + 0.005 * n)
-    count = round(lost * few)
-    return "nearly always" if count == few else "hardly ever" if count == 0 else f"{count} in {few}"
-
-
-def _reached(fix: Fix, result: ObjectiveResult) -> str:
-    """What the best change brings of an objective whose limit it does not reach."""
-    name, unit, predicted = result.variable.name, result.variable.unit, fix.predicted.get(result.variable.name)
-    if predicted is None or result.threshold is None or result.variable.kind == "functional":
-        return ""
-    if result.threshold.met(predicted.value):
-        return ""
-    likely = predicted.high if result.threshold.op in ("<=", "<") else predicted.low
-    value, limit = (f"{number:.4g} {unit}".rstrip() for number in (likely, result.threshold.value))
-    return f"{name} is 90 % sure to reach {value}, the limit of {limit} is out of reach"
+    if not suspected and not battery_is_low(failed.run, failed.query.model, failed.profile.schema):
+        return frozenset()
+    return frozenset(one.name for one in failed.profile.schema.options if one.safety and one.unit == "V")

@@ -21,11 +21,11 @@ SURE, UNSURE = 0.4, 0.1
 HIGH_SUPPORT, LOW_SUPPORT = 0.8, 0.5
 
 
-def causes_of(case: FailedRun, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
+def causes_of(failed: FailedRun, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
     """Options that cost this run, those that a failed check names first; where none of them convinces, a few leads
     that are not ruled out behind them."""
-    others = not_ruled_out(case.query, result.variable.name, found)
-    refused = case.run.refused_by if result.variable.kind == "functional" else frozenset()
+    others = not_ruled_out(failed.query, result.variable.name, found)
+    refused = failed.run.refused_by if result.variable.kind == "functional" else frozenset()
     first = [suspect for suspect in (*found, *others) if suspect.option in refused]
     named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
     if not first and (not named or named[0].contribution < CONVINCING):
@@ -34,15 +34,15 @@ def causes_of(case: FailedRun, result: ObjectiveResult, found: tuple[Suspect, ..
         weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION > suspect.weight]
         named += [*weak, *others][: max(0, MOST_LEADS - len(named))]
     named = first + [suspect for suspect in named if suspect not in first]
-    return tuple(_cause(case, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
+    return tuple(_cause(failed, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
 
 
-def _cause(case: FailedRun, result: ObjectiveResult, suspect: Suspect, rank: int) -> Cause:
-    name, query = suspect.option, case.query
-    option = case.profile.schema.variables[name]
+def _cause(failed: FailedRun, result: ObjectiveResult, suspect: Suspect, rank: int) -> Cause:
+    name, query = suspect.option, failed.query
+    option = failed.profile.schema.variables[name]
     is_predictable = result.variable.name in query.model.outcomes and name not in query.kept
     best = best_alone(query, name) if is_predictable else None
-    path = describe_path(suspect.path, query, case.run, by_physics=suspect.by_physics)
+    path = describe_path(suspect.path, query, failed.run, by_physics=suspect.by_physics)
     in_support = query.model.supports(name, query.config[name])
     support = 1.0 if suspect.by_physics else (suspect.effect.support if suspect.effect is not None else None) or 0.0
     changed = query.config if best is None else {**query.config, name: best[0]}
@@ -57,15 +57,15 @@ def _cause(case: FailedRun, result: ObjectiveResult, suspect: Suspect, rank: int
         suggested=None if best is None else best[0],
         predicted=None if best is None else prediction(query, result.variable.name, changed),
         p_fixed=None if best is None else best[1],
-        confidence=_confidence(case, result, suspect, in_support, support),
+        confidence=_confidence(failed, result, suspect, in_support, support),
         in_support=in_support,
-        notes=_cause_notes(case, suspect, in_support, support),
+        notes=_cause_notes(failed, suspect, in_support, support),
         is_assumed=name in query.assumed,
-        is_lead=suspect.weight < MIN_CONTRIBUTION and name not in case.run.refused_by,
+        is_lead=suspect.weight < MIN_CONTRIBUTION and name not in failed.run.refused_by,
     )
 
 
-def as_in_fix(case: FailedRun, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
+def as_in_fix(failed: FailedRun, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
     """The causes with the values that the fix gives their options: nobody is told two values for one option.
     Beside a fix whose odds were not measured none has any: what training says of them was not enough to advise one."""
     values = {change.option.name: change.suggested for change in fix.changes}
@@ -77,9 +77,11 @@ def as_in_fix(case: FailedRun, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
             return replace(cause, suggested=value, predicted=predicted, p_fixed=None)
         if value is None or value == cause.suggested:
             return cause
-        changed = {**case.query.config, cause.option.name: value}
-        promised = prediction(case.query, fault.objective.variable.name, changed)
-        return replace(cause, suggested=value, predicted=promised, p_fixed=float(case.query.probability([changed])[0]))
+        changed = {**failed.query.config, cause.option.name: value}
+        promised = prediction(failed.query, fault.objective.variable.name, changed)
+        return replace(
+            cause, suggested=value, predicted=promised, p_fixed=float(failed.query.probability([changed])[0])
+        )
 
     return tuple(map(as_in_fix, fault.causes))
 
@@ -95,7 +97,7 @@ def as_ranked(faults: Sequence[Fault], failure: NoisyOr) -> tuple[Fault, ...]:
 
 
 def _confidence(
-    case: FailedRun, result: ObjectiveResult, suspect: Suspect, in_support: bool, support: float
+    failed: FailedRun, result: ObjectiveResult, suspect: Suspect, in_support: bool, support: float
 ) -> Confidence:
     """High where the option explains most of a fault that is one wherever in its interval the threshold lies, nearly
     every resample gives it a path there, the log holds its value, and no option that the training runs cannot judge is
@@ -104,21 +106,21 @@ def _confidence(
     A check that refused this run and reads the option's value is worth more than a doubt about the model.
     """
     contribution = suspect.contribution
-    if case.choice.fit.verdict != "fits":
+    if failed.choice.fit.verdict != "fits":
         return "low"
     if not in_support or support < LOW_SUPPORT or contribution < UNSURE:
-        return "medium" if suspect.option in case.run.refused_by else "low"
-    if case.profile.schema.observational:
+        return "medium" if suspect.option in failed.run.refused_by else "low"
+    if failed.profile.schema.observational:
         # Operators chose the options: no table can rule a hidden reason out.
         return "low" if suspect.effect is None or suspect.effect.doubtful == 1.0 else "medium"
-    is_rivalled = bool(case.unranked[suspect.path.nodes[-1]])
-    is_recorded = suspect.option not in case.query.assumed
+    is_rivalled = bool(failed.unranked[suspect.path.nodes[-1]])
+    is_recorded = suspect.option not in failed.query.assumed
     if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled and result.is_sure and is_recorded:
         return "high"
     return "medium"
 
 
-def _cause_notes(case: FailedRun, suspect: Suspect, in_support: bool, support: float) -> tuple[Note, ...]:
+def _cause_notes(failed: FailedRun, suspect: Suspect, in_support: bool, support: float) -> tuple[Note, ...]:
     notes: list[Note] = []
     left = ": not ruled out" if suspect.weight < MIN_CONTRIBUTION else ""
     if suspect.effect is None and not suspect.by_physics:
@@ -128,19 +130,21 @@ def _cause_notes(case: FailedRun, suspect: Suspect, in_support: bool, support: f
     if suspect.symptom is not None and suspect.contribution < MIN_CONTRIBUTION <= suspect.weight:
         notes.append(Note(f"this run's {suspect.symptom} points at it"))
     if not in_support:
-        summary = case.query.model.summaries[suspect.option]
+        summary = failed.query.model.summaries[suspect.option]
         notes.append(Note(f"outside the training support ({summary.low:g} to {summary.high:g})", "outside_training"))
     if suspect.effect is not None and support < LOW_SUPPORT:
         notes.append(Note(f"a path to {suspect.path.nodes[-1]} was found in only {support:.0%} of resamples"))
     if suspect.not_borne_out:
         better = ", ".join(suspect.not_borne_out)
         notes.append(Note(f"better than expected in this run, so hardly the way it went: {better}"))
-    if case.profile.schema.observational:
+    if failed.profile.schema.observational:
         notes.append(Note(_chosen_by_operators(suspect.effect)))
-    if suspect.option in case.query.kept:
+    if suspect.option in failed.query.kept:
         notes.append(Note("pinned by --keep: not changed"))
-    notes += map(Note, change_notes(case.profile.schema.variables[suspect.option]))
-    notes += [Note(str(evidence), "in_the_log") for evidence in case.run.evidence if suspect.option in evidence.options]
+    notes += map(Note, change_notes(failed.profile.schema.variables[suspect.option]))
+    notes += [
+        Note(str(evidence), "in_the_log") for evidence in failed.run.evidence if suspect.option in evidence.options
+    ]
     return tuple(notes)
 
 

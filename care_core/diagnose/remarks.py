@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.diagnose.advice import by_chance
 from care_core.diagnose.failed_run import FailedRun
 from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import Judged, unread_options
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Fix, ObjectiveResult
+from care_core.diagnose.worth import by_chance
 from care_core.records import replace
 
 
@@ -21,30 +21,32 @@ def reference_of(judged: Judged) -> str:
     return f"compared with {judged.reference.source}; {count}"
 
 
-def notes_of(case: FailedRun, broken: Sequence[ObjectiveResult], fix: Fix | None, as_driven: float) -> tuple[str, ...]:
-    notes = [case.reference]
+def notes_of(
+    failed: FailedRun, broken: Sequence[ObjectiveResult], fix: Fix | None, as_driven: float
+) -> tuple[str, ...]:
+    notes = [failed.reference]
     for name in (result.variable.name for result in broken):
-        unknown = ", ".join(suspect.option for suspect in case.unranked[name])
+        unknown = ", ".join(suspect.option for suspect in failed.unranked[name])
         if unknown:
             notes.append(f"not ranked, as the training runs cannot tell their effect on {name}: {unknown}")
     notes += [
         f"no mechanism predicts {name}: it counts with its base rate, {rate:.0%} of the training missions"
-        for name, rate in case.query.base_rates().items()
+        for name, rate in failed.query.base_rates().items()
     ]
-    notes.append(_promise(case.query, [result.variable.name for result in broken]))
+    notes.append(_promise(failed.query, [result.variable.name for result in broken]))
     if fix is not None and not fix.shown_by:
-        notes += filter(None, [by_chance(fix, as_driven, _odds(case.query))])
-    if fix is not None and not fix.shown_by and case.profile.schema.observational:
-        notes.append(_if_hidden(case, fix, as_driven))
-    if not case.run.mission.fits and case.run.mission.mismatch not in notes:
-        notes.append(case.run.mission.mismatch)
-    unread = unread_options(case.profile.schema, case.run) & set(case.off)
+        notes += filter(None, [by_chance(fix, as_driven, _odds(failed.query))])
+    if fix is not None and not fix.shown_by and failed.profile.schema.observational:
+        notes.append(_if_hidden(failed, fix, as_driven))
+    if not failed.run.mission.fits and failed.run.mission.mismatch not in notes:
+        notes.append(failed.run.mission.mismatch)
+    unread = unread_options(failed.profile.schema, failed.run) & set(failed.off)
     if unread:
-        named = ", ".join(option.name for option in case.profile.schema.options if option.name in unread)
+        named = ", ".join(option.name for option in failed.profile.schema.options if option.name in unread)
         notes.append(f"no suspect, as no mode that reads it was entered: {named}")
-    spoken_for = implied(case.run, case.profile.schema, case.profile.model, case.query.reference)
+    spoken_for = implied(failed.run, failed.profile.schema, failed.profile.model, failed.query.reference)
     notes += map(str, spoken_for.values())
-    if names := sorted(case.query.assumed - spoken_for.keys()):
+    if names := sorted(failed.query.assumed - spoken_for.keys()):
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
         notes.append(f"not in the log, taken to be at their reference: {shown}")
     return tuple(notes)
@@ -66,10 +68,10 @@ def _odds(query: CounterfactualQuery) -> float:
     return float(replace(query, observed={}, repeats=()).probability([query.reference])[0])
 
 
-def _if_hidden(case: FailedRun, fix: Fix, now: float) -> str:
+def _if_hidden(failed: FailedRun, fix: Fix, now: float) -> str:
     """What is left of a fix's promise where something unrecorded moved options and objectives together."""
     names = {change.option.name for change in fix.changes}
-    effects = [effect for (option, _), effect in case.query.model.effects.items() if option in names]
+    effects = [effect for (option, _), effect in failed.query.model.effects.items() if option in names]
     doubt = max((effect.doubtful for effect in effects), default=1.0)
     left = min(fix.p_fixed, now + (1.0 - doubt) * (fix.p_fixed - now))
     return (

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 from care_core.diagnose import provenance
-from care_core.diagnose.advice import explained, outweighed, promised_causes
-from care_core.diagnose.advising import all_back, of_options, of_outside, part_first
+from care_core.diagnose.advice import all_back, of_options, of_outside, part_first
 from care_core.diagnose.blame import blame
 from care_core.diagnose.causes import as_in_fix, as_ranked, causes_of
 from care_core.diagnose.circumstances import circumstances, unusual
@@ -27,6 +26,7 @@ from care_core.diagnose.remarks import notes_of, reference_of
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import AGAIN, SAME_AGAIN, AllBack, tell_more
 from care_core.diagnose.unexplained import out_of_reach, refused_otherwise
+from care_core.diagnose.worth import explained, outweighed, promised_causes
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
@@ -104,11 +104,11 @@ def diagnose(
     weighed, outside, failure = blamed.suspects, blamed.outside, blamed.failure
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
-    case = FailedRun(profile, choice, run, query, reference_of(judged), unranked, health.findings)
-    refused = refused_otherwise(case, health)
-    unheard = {result.variable.name: refused or out_of_reach(case, result) for result in broken}
+    failed = FailedRun(profile, choice, run, query, reference_of(judged), unranked, health.findings)
+    refused = refused_otherwise(failed, health)
+    unheard = {result.variable.name: refused or out_of_reach(failed, result) for result in broken}
     faults = tuple(
-        Fault(result, () if unheard[name] else causes_of(case, result, found[name], top))
+        Fault(result, () if unheard[name] else causes_of(failed, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
     )
     hypotheses = hypotheses_of(failure)
@@ -116,19 +116,19 @@ def diagnose(
     promise = Promise(failure, query, [result.variable.name for result in broken])
     as_driven = promise.as_driven()
     beyond = next(filter(None, unheard.values()), None)
-    part = part_first(case, health.findings)
+    part = part_first(failed, health.findings)
     lead = leading_outside(hypotheses, outside, health.findings, run)
     if lead is not None and (part is None or lead.is_found):
-        advised = of_outside(lead, case, hypotheses, promise)
+        advised = of_outside(lead, failed, hypotheses, promise)
     else:
         lead = None
         against = (part and unmended(part)) or beyond or outweighed(hypotheses, health.findings)
         options = {s.option for group in found.values() for s in group}
-        advised = of_options(case, judged, faults, hypotheses, options, promise, against)
+        advised = of_options(failed, judged, faults, hypotheses, options, promise, against)
     fixes, abstained = advised.fixes, advised.abstained
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None and lead is None:
-        faults = tuple(replace(fault, causes=as_in_fix(case, fault, fixes[0])) for fault in faults)
+        faults = tuple(replace(fault, causes=as_in_fix(failed, fault, fixes[0])) for fault in faults)
     faults = as_ranked(promised_causes(faults, promise), failure)
     advised_odds = as_driven if abstained or fixes[0].odds is None else fixes[0].odds
     report("done", 1.0)
@@ -142,10 +142,10 @@ def diagnose(
         odds_as_driven=as_driven,
         abstained=abstained,
         why_this=advised.why or _why_this(fixes, abstained, as_driven, hypotheses, faults),
-        notes=notes_of(case, broken, None if abstained or lead else fixes[0], as_driven),
+        notes=notes_of(failed, broken, None if abstained or lead else fixes[0], as_driven),
         missions=judged.missions,
         rivals=circumstances(run, query, schema) if unsure else (),
-        tell_more=_tell_more(case, faults, health, all_back(case, promise, advised_odds))
+        tell_more=_tell_more(failed, faults, health, all_back(failed, promise, advised_odds))
         if unsure and not beyond
         else (),
         health=health,
@@ -202,17 +202,17 @@ def _weights(outside: Sequence[OutsideSuspect]) -> dict[str, float]:
 
 
 def _tell_more(
-    case: FailedRun, faults: tuple[Fault, ...], health: Health, everything: AllBack | None
+    failed: FailedRun, faults: tuple[Fault, ...], health: Health, everything: AllBack | None
 ) -> tuple[str, ...]:
-    upset = was_upset(case.run, health.findings)
+    upset = was_upset(failed.run, health.findings)
     return tell_more(
-        case.query,
+        failed.query,
         faults,
-        case.run,
-        case.unranked,
-        observational=case.profile.schema.observational,
-        again=f"try it {trial(case.run)}" if upset else AGAIN,
-        nothing_else=bench(case.run) if upset else SAME_AGAIN,
+        failed.run,
+        failed.unranked,
+        observational=failed.profile.schema.observational,
+        again=f"try it {trial(failed.run)}" if upset else AGAIN,
+        nothing_else=bench(failed.run) if upset else SAME_AGAIN,
         all_back=everything,
     )
 

@@ -10,19 +10,19 @@ from care_core.text import listed
 from care_core.variables import Variable
 
 
-def refused_otherwise(case: FailedRun, health: Health) -> str | None:
+def refused_otherwise(failed: FailedRun, health: Health) -> str | None:
     """Said where the run ended at a refusal to arm that speaks of no option of the profile: for what an operator has to
     do, or for none of the complaints that the profile tells apart. What options do in flight is no cause of it."""
     said = next((one for one in health.findings if one.kind == "prearm"), None)
-    if said is None or case.run.refused_by:
+    if said is None or failed.run.refused_by:
         return None
     if said.parameters:
         read = listed(said.parameters)
         return f"{said.title}: that check reads {read}; look there first"
     if said.suspect == "operation":
         return f"{said.title}: that check reads no parameter of the profile, so none explains it"
-    complaints = [one for one in case.profile.schema.metrics if _is_of_one_complaint(one)]
-    if not complaints or any(case.run.metrics.get(one.name) == 1 for one in complaints):
+    complaints = [one for one in failed.profile.schema.metrics if _is_of_one_complaint(one)]
+    if not complaints or any(failed.run.metrics.get(one.name) == 1 for one in complaints):
         return None
     return f"{said.title}: that complaint speaks of no parameter of the profile, so none is blamed"
 
@@ -32,12 +32,12 @@ def _is_of_one_complaint(metric: Variable) -> bool:
     return how is not None and how.kind == "arming_refused" and bool(how.args)
 
 
-def out_of_reach(case: FailedRun, result: ObjectiveResult) -> str | None:
+def out_of_reach(failed: FailedRun, result: ObjectiveResult) -> str | None:
     """Said of what no training run came near, a threshold or a way to fail: no option can be blamed for it."""
     if result.variable.kind == "functional":
-        return _new_way_to_fail(case)
+        return _new_way_to_fail(failed)
     name, bound = result.variable.name, result.threshold
-    summary = case.query.model.summary_at(name, case.query.reference)
+    summary = failed.query.model.summary_at(name, failed.query.reference)
     if bound is None or summary is None:
         return None
     best = summary.low if bound.op in ("<=", "<") else summary.high
@@ -48,9 +48,9 @@ def out_of_reach(case: FailedRun, result: ObjectiveResult) -> str | None:
     return f"no run of the profile's training met {name} {bound}{unit} ({nearest}): no parameter explains it"
 
 
-def _new_way_to_fail(case: FailedRun) -> str | None:
-    for variable in case.profile.schema.metrics:
-        summary, value = case.query.model.summaries.get(variable.name), case.run.metrics.get(variable.name)
+def _new_way_to_fail(failed: FailedRun) -> str | None:
+    for variable in failed.profile.schema.metrics:
+        summary, value = failed.query.model.summaries.get(variable.name), failed.run.metrics.get(variable.name)
         if variable.type != "bool" or summary is None or not is_known(value):
             continue
         if summary.low == summary.high != value:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from care_core.causal.model import Model
 from care_core.configs.driven import same_value
-from care_core.diagnose.advice import adds_enough
 from care_core.diagnose.fixes import GAIN_FOR_ONE_MORE
+from care_core.diagnose.worth import adds_enough
 from care_core.errors import CareError
 from care_core.fleet.rows import Row, distinct
 from care_core.fleet.shared import FEWEST, Unit, name_of, unit_of

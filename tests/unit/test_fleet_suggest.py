@@ -126,7 +126,7 @@ def test_a_robot_is_helped_where_most_of_its_failures_are(failed: Row) -> None:
 
 def test_a_robot_is_helped_by_what_a_change_adds(failed: Row, monkeypatch: pytest.MonkeyPatch) -> None:
     for worth, helped in ((0.0, ["a", "b"]), (0.99, [])):
-        monkeypatch.setattr("care_core.diagnose.advice.WORTH", replace(WORTH, value=worth))
+        monkeypatch.setattr("care_core.diagnose.worth.WORTH", replace(WORTH, value=worth))
         found = only([on("a", failed), on("b", failed)])
         best = found if isinstance(found, Suggestion) else found.best
         assert best is not None

@@ -1,7 +1,6 @@
 """Motors that are kept from their thrust, a throttle that swings, a hover throttle that is not the vehicle's.
 
-All that motors have is spent where the throttle stays high and the vehicle stays down. Their outputs then end where
-MOT_PWM_MIN, MOT_PWM_MAX and MOT_SPIN_MAX end them (AP_MotorsMulticopter: output_to_pwm).
+All that motors have is spent where the throttle stays high and the vehicle stays down.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.settings.output_range import Kept, kept_from_range
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
@@ -17,8 +17,6 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 from care_core.numbers import known_median, median
-from care_core.records import Record
-from care_core.run import shown
 
 READS: Wanted = {"CTUN": ("ThO", "Alt"), "RCOU": tuple(f"C{n}" for n in range(1, 9))}
 
@@ -51,18 +49,6 @@ _GAINS = (
     "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D", "PSC_ACCZ_FF", "PSC_ACCZ_D_FF", "PSC_VELZ_P", "PSC_VELZ_I", "PSC_VELZ_D",
     "PSC_POSZ_P",
 )  # fmt: skip
-_SHIPPED = {"MOT_SPIN_MAX": 0.95, "MOT_PWM_MAX": 2000.0, "MOT_PWM_MIN": 1000.0}
-"""What the firmware comes with, where the log tells no default."""
-
-
-class Kept(Record):
-    """What keeps the outputs of the motors from their range."""
-
-    parameter: str
-    wanted: float
-    evidence: str
-    share: float
-    """What is left of the range as shipped."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -77,13 +63,15 @@ def find(flight: Flight) -> Iterator[Finding]:
 def _kept_down(flight: Flight) -> Iterator[Finding]:
     if (down := kept_down(flight)) is not None:
         kept, span = down
+        highest = _highest_output(flight)
+        reached = "" if highest is None else f"the outputs end at {highest:.0f} us of {kept.whole_us:.0f}, for "
         yield Finding(
             kind="thrust",
             title="too little thrust to take off",
             onset_s=span[0],
             end_s=span[1],
             severity="critical",
-            evidence=f"{span[1] - span[0]:.0f} s at full throttle without rising; {kept.evidence}",
+            evidence=f"{span[1] - span[0]:.0f} s at full throttle without rising; {reached}{kept}",
             source="CTUN.ThO, RCOU",
             suspect="parameter",
             probability=float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE, _UNSURE))),
@@ -95,8 +83,16 @@ def _kept_down(flight: Flight) -> Iterator[Finding]:
 def kept_down(flight: Flight) -> tuple[Kept, Span] | None:
     """The parameter that keeps a copter on the ground, and when; None where none does, and where one motor alone is at
     its end while the others have range left: that is a motor's own weakness."""
-    kept, span = kept_from_range(flight), _spent_on_ground(flight)
-    return None if kept is None or span is None or not _all_are_spent(flight, span) else (kept, span)
+    kept, span = kept_from_range(flight, "MOT_"), _spent_on_ground(flight)
+    if kept is None or kept.share >= _KEPT or span is None:
+        return None
+    return (kept, span) if _reaches(flight, kept) and _all_are_spent(flight, span) else None
+
+
+def _reaches(flight: Flight, kept: Kept) -> bool:
+    """Whether the outputs reach what is left of their range; where none are recorded, too."""
+    highest = _highest_output(flight)
+    return highest is None or highest >= kept.end_us - _REACHED * kept.range_us
 
 
 def _all_are_spent(flight: Flight, span: Span) -> bool:
@@ -115,27 +111,6 @@ def _spent_on_ground(flight: Flight) -> Span | None:
     t, driven = flight.throttle
     high = smooth(t, driven, 4.0) > _SPENT
     return next(iter(lasting(t, high & during(flight.armed, t), _GROUNDED_S, gap_s=5.0)), None)
-
-
-def kept_from_range(flight: Flight) -> Kept | None:
-    """The parameter that takes most of the range of the motors' outputs, where they reach what it leaves; None where
-    that is nearly whole."""
-    driven = {name: flight.setting(name) for name in _SHIPPED}
-    least, most, spin = driven["MOT_PWM_MIN"], driven["MOT_PWM_MAX"], driven["MOT_SPIN_MAX"]
-    if least is None or not most or not spin:
-        return None
-    left = {name: flight.default_left(name) for name in _SHIPPED}
-    whole = {name: shipped if left[name] is None else left[name] or 0.0 for name, shipped in _SHIPPED.items()}
-    span = whole["MOT_PWM_MAX"] - whole["MOT_PWM_MIN"]
-    if span <= 0.0 or whole["MOT_SPIN_MAX"] <= 0.0:
-        return None
-    shares = {"MOT_SPIN_MAX": spin / whole["MOT_SPIN_MAX"], "MOT_PWM_MAX": (most - whole["MOT_PWM_MIN"]) / span}
-    share, name = min((share, name) for name, share in shares.items())
-    highest = _highest_output(flight)
-    if share >= _KEPT or (highest is not None and highest < least + spin * (most - least) - _REACHED * span):
-        return None
-    reached = "" if highest is None else f"the outputs end at {highest:.0f} us of {whole['MOT_PWM_MAX']:.0f}, for "
-    return Kept(name, whole[name], f"{reached}{name} is {shown(driven[name])} (as shipped {whole[name]:g})", share)
 
 
 def _highest_output(flight: Flight) -> float | None:

@@ -1,7 +1,6 @@
 """A QuadPlane whose lift motors give all that they may, and which stays on the ground.
 
-What they may give ends where Q_M_PWM_MAX and Q_M_SPIN_MAX end it (AP_MotorsMulticopter: output_to_pwm): of simulated
-QuadPlanes of 3 kg none took off with less than 0.65 of the range as shipped.
+Of simulated QuadPlanes of 3 kg none took off with less than 0.65 of the range of their outputs as shipped.
 """
 
 from __future__ import annotations
@@ -10,14 +9,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.settings.output_range import kept_from_range
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
-from care_core.records import Record
-from care_core.run import shown
 
 READS: Wanted = {"QTUN": ("ThO",)}
 
@@ -31,17 +29,6 @@ _TOO_LITTLE = LIMITS.add(
 _SURE = LIMITS.add("probability that what ends the outputs keeps it down", 0.9, "", "as a copter's")
 _UNSURE = LIMITS.add("the same where nearly all is left", 0.2, "", "as a copter's")
 _PART = LIMITS.add("probability of a part where nothing ends them", 0.5, "", "a choice: a load looks the same")
-_SHIPPED = {"Q_M_SPIN_MAX": 0.95, "Q_M_PWM_MAX": 2000.0}
-_PWM_MIN = 1000.0
-
-
-class _Kept(Record):
-    """What ends the outputs: the share of the range as shipped that it leaves."""
-
-    parameter: str
-    value: float
-    shipped: float
-    share: float
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -53,8 +40,9 @@ def find(flight: Flight) -> Iterator[Finding]:
     spans = lasting(lift.t, spent, _GROUNDED_S, gap_s=5.0)
     if not spans:
         return
-    kept, (start, end) = _kept(flight), spans[0]
-    ended = "" if kept is None else f"; {kept.parameter} is {shown(kept.value)} (as shipped {kept.shipped:g})"
+    (start, end), kept = spans[0], kept_from_range(flight, "Q_M_")
+    kept = kept if kept is not None and kept.share < _KEPT else None
+    ended = "" if kept is None else f"; {kept}"
     yield Finding(
         kind="thrust",
         title="too little thrust to take off",
@@ -66,21 +54,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         suspect="hardware" if kept is None else "parameter",
         probability=_PART if kept is None else float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE, _UNSURE))),
         parameters=() if kept is None else (kept.parameter,),
-        wanted=() if kept is None else ((kept.parameter, kept.shipped),),
+        wanted=() if kept is None else ((kept.parameter, kept.wanted),),
     )
-
-
-def _kept(flight: Flight) -> _Kept | None:
-    """The parameter that leaves the least of the range; None where that is nearly whole."""
-    found = []
-    for name, usual in _SHIPPED.items():
-        value, left = flight.setting(name), flight.default_left(name)
-        shipped = left or usual
-        idle = _PWM_MIN if name.endswith("PWM_MAX") else 0.0
-        if value and shipped > idle:  # a pulse of 0 leaves the range to the receiver's
-            found.append(_Kept(name, value, shipped, (value - idle) / (shipped - idle)))
-    least = min(found, key=lambda one: one.share, default=None)
-    return least if least is not None and least.share < _KEPT else None
 
 
 CHECK = Check("lift", "a QuadPlane that stays on the ground with all its lift", READS, LIMITS, find)

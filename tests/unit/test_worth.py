@@ -8,7 +8,11 @@ from typing import Any, cast
 
 import pytest
 
-from care_core.diagnose.advice import (
+from care_core.diagnose.advice import failsafes_held
+from care_core.diagnose.circumstances import battery_is_low
+from care_core.diagnose.parts import mend_first, unmended
+from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
+from care_core.diagnose.worth import (
     adds_enough,
     by_chance,
     explained,
@@ -17,10 +21,6 @@ from care_core.diagnose.advice import (
     no_stand_out,
     outweighed,
 )
-from care_core.diagnose.advising import failsafes_held
-from care_core.diagnose.circumstances import battery_is_low
-from care_core.diagnose.parts import mend_first, unmended
-from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
 from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding, FindingKind, Severity, SuspectKind
 from care_core.profile.store import load_profile
 from care_core.records import replace
