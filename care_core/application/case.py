@@ -262,9 +262,9 @@ def _plainly(
     from care_core.diagnose.triage import unjudged, without_profile
     from care_core.extract.read import log_info
 
-    judged = judge_plainly(model, mission=request.mission, sha256=sha256, findings=health.findings)
+    judged = judge_plainly(model, mission=request.mission, sha256=sha256, health=health)
     if judged is not None:
-        health = _linted(model, health, judged, configs)
+        health = _linted(model, health.of_run(judged.run.mission.start_s), judged, configs)
         return without_profile(judged, choice, health)
     settings = {name: history[-1] for name, history in model.log.settings().items()}
     return unjudged(log_info(model, sha256()), settings, choice, health)
@@ -295,7 +295,7 @@ def _read(
         mission=request.mission,
         good=good,
         sha256=sha256,
-        findings=health.findings,
+        health=health,
     )
     repeats = []
     for path in request.repeats:
@@ -309,6 +309,7 @@ def _read(
                 hint = "Triage them one by one."
                 raise NoRepeatsError(f"The logs are no repeats: {reason}", hint=hint, where=str(path)) from err
             repeats.append(repeat)
+    health = health.of_run(judged.run.mission.start_s)
     health = _linted(model, health, judged, configs, profile.schema.options, good)
     return Reading(profile, choice, configs, with_repeats(judged, repeats), health)
 

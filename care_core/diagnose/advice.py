@@ -21,7 +21,7 @@ from care_core.diagnose.fixes import (
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.next_step import was_refused
 from care_core.diagnose.outside.change import Advisable, check_first, outside_fix
-from care_core.diagnose.parts import mend_first
+from care_core.diagnose.parts import mend_first, set_wrong
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Fault, Fix, Hypothesis
@@ -84,12 +84,14 @@ def of_options(
     options: Collection[str],
     promise: Promise,
     against: str | None,
+    unheard: str | None,
 ) -> Advised:
     """What is advised of the options of the profile.
 
     Args:
         options: those that may have moved what broke.
         against: why nothing is advised whatever is found, None where nothing stands against it.
+        unheard: why training says nothing of this failure, None where it does. What the run itself shows is heard.
     """
     broken, as_driven = judged.broken, promise.as_driven()
     held = failsafes_held(failed, failed.findings)
@@ -101,7 +103,8 @@ def of_options(
     if against is not None:
         return Advised(fixes, against)
     abstained = (
-        _abstains(failed, faults, fixes, held, promise)
+        unheard
+        or _abstains(failed, faults, fixes, held, promise)
         or falls_short(fixes[0], broken, as_driven)
         or untried(fixes[0], failed.profile.schema.learned_elsewhere)
         or unrecorded(fixes[0], failed.choice.fit.verdict)
@@ -227,16 +230,26 @@ def _shown_by_run(failed: FailedRun, hypotheses: Sequence[Hypothesis]) -> Fix | 
     """The parameters that a critical finding of this run names, back at their reference: what it shows is worth a
     change where training says little of it, though nothing says what that promises. None where none stands above
     chance."""
-    query, shown = failed.query, next((one for one in failed.run.evidence if one.kind == "found"), None)
-    if shown is None or failed.profile.schema.learned_elsewhere:
+    query, (title, named) = failed.query, _named_by_run(failed)
+    if not named or failed.profile.schema.learned_elsewhere:
         return None
     chance = sum(one.probability for one in hypotheses if one.what == "chance")
     likely = {one.name for one in hypotheses if one.what == "parameter" and one.probability > chance}
-    back = {name: query.reference[name] for name in shown.options if name not in query.kept}
+    back = {name: query.reference[name] for name in named if name not in query.kept}
     if not likely & back.keys() or not all(query.variables[name].accepts(value) for name, value in back.items()):
         return None
     fix = to_fix(query, back, float(query.probability([{**query.config, **back}])[0]))
-    return replace(fix, predicted={}, shown_by=shown.text.partition(":")[0])
+    return replace(fix, predicted={}, shown_by=title)
+
+
+def _named_by_run(failed: FailedRun) -> tuple[str, Collection[str]]:
+    """The first critical finding that names options off their reference, by the profile's rules or by itself."""
+    for finding in (one for one in failed.findings if one.severity == "critical" and set_wrong(one)):
+        said = (e.options for e in failed.run.evidence if e.kind == "found" and e.text.startswith(f"{finding.title}:"))
+        named = next(said, finding.parameters)
+        if named and failed.off.issuperset(named):
+            return finding.title, named
+    return "", ()
 
 
 def all_back(failed: FailedRun, promise: Promise, advised: float) -> AllBack | None:

@@ -14,7 +14,7 @@ from care_core.diagnose.limits import limits_of
 from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
 from care_core.diagnose.reference import Good, Reference, reference_of
 from care_core.ecosystems.base import RunModel
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import NOTHING_SEEN, Finding, Health
 from care_core.errors import NoRepeatsError, UsageError, nearest
 from care_core.extract.plain import read_plain_runs
 from care_core.extract.read import mission_number, read_runs
@@ -23,6 +23,7 @@ from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import Record, field, replace
 from care_core.run import Check, Run, Setting, Unavailable, Value, is_known
+from care_core.text import log_time
 from care_core.variables import Role, Threshold, Variable
 
 _YES = Threshold("==", 1.0)
@@ -68,7 +69,7 @@ def read_and_judge(
     mission: int | None = None,
     good: Good | None = None,
     sha256: Sha256 | None = None,
-    findings: Sequence[Finding] = (),
+    health: Health = NOTHING_SEEN,
 ) -> Judged:
     """Read one mission of a log and judge it.
 
@@ -78,7 +79,7 @@ def read_and_judge(
         mission: which mission of the log, from 1; the last when None.
         good: the configuration to judge against, where the operator named one.
         sha256: gives the log's digest, where the caller has begun to work it out.
-        findings: what was found in the log; no objective is met that they contradict.
+        health: what was found in the log; no objective is met that it contradicts.
 
     Raises:
         CareError: the log holds no such mission, the profile has no usable model, or no such objective.
@@ -88,9 +89,9 @@ def read_and_judge(
     given = resolve(configs, (parameter for option in schema.options for parameter in readable(option)))
     accomplished = [o.name for o in schema.objectives if o.extract is not None and o.extract.kind in _ACCOMPLISHED]
     runs = read_runs(model, schema, overrides=given, sha256=sha256)
-    runs = tuple(as_found(run, findings, accomplished) for run in runs)
+    runs = tuple(as_found(run, found_in(health, run), accomplished) for run in runs)
     judged = [judge(run, schema, profile.model, thresholds, good) for run in runs]
-    verdicts = tuple(verdict(one) for one in judged)
+    verdicts = tuple(verdict(one, found_in(health, one.run)) for one in judged)
     return replace(
         judged[mission_number(mission, len(runs)) - 1], configs=tuple(configs), given=given, missions=verdicts
     )
@@ -101,28 +102,36 @@ def judge_plainly(
     *,
     mission: int | None = None,
     sha256: Sha256 | None = None,
-    findings: Sequence[Finding] = (),
+    health: Health = NOTHING_SEEN,
 ) -> Judged | None:
     """Judge one run of a log that no profile fits by what its robot says of itself; None where the log holds no run.
 
-    Without a profile there is no limit, so no value of the run is judged, only what it did; `findings` as for
+    Without a profile there is no limit, so no value of the run is judged, only what it did; `health` as for
     `read_and_judge`.
 
     Raises:
         CareError: the log holds no such mission.
     """
-    runs = [as_found(run, findings) for run in read_plain_runs(model, sha256)]
+    runs = [as_found(run, found_in(health, run)) for run in read_plain_runs(model, sha256)]
     if not runs:
         return None
     judged = [Judged(run, {}, {}, (), tuple(map(_judge_check, run.checks))) for run in runs]
-    verdicts = tuple(verdict(one) for one in judged)
+    verdicts = tuple(verdict(one, found_in(health, one.run)) for one in judged)
     return replace(judged[mission_number(mission, len(runs)) - 1], missions=verdicts)
 
 
-def verdict(judged: Judged) -> MissionVerdict:
-    """What became of a mission, in short: what was broken, else why it could not be judged."""
+def found_in(health: Health, run: Run) -> tuple[Finding, ...]:
+    """What was found in a run's part of the log."""
+    return health.of_run(run.mission.start_s).findings
+
+
+def verdict(judged: Judged, findings: Sequence[Finding] = ()) -> MissionVerdict:
+    """What became of a mission, in short: what was broken or found critical, else why it could not be judged."""
     everything = (*judged.results, *judged.checks)
     broken = dict.fromkeys(result.sentence for result in everything if result.status == "fault")
+    if judged.run.mission.count > 1 and not broken:
+        critical = (one for one in findings if one.severity == "critical" and not one.after_impact)
+        broken = dict.fromkeys(f"{one.title} at {log_time(one.onset_s)}" for one in critical)
     if broken:
         return MissionVerdict(judged.run.mission, "fault", "; ".join(broken), everything)
     if judged.checks and judged.results:

@@ -122,9 +122,9 @@ def diagnose(
         advised = of_outside(lead, failed, hypotheses, promise)
     else:
         lead = None
-        against = (part and unmended(part)) or beyond or outweighed(hypotheses, health.findings)
+        against = (part and unmended(part)) or outweighed(hypotheses, health.findings)
         options = {s.option for group in found.values() for s in group}
-        advised = of_options(failed, judged, faults, hypotheses, options, promise, against)
+        advised = of_options(failed, judged, faults, hypotheses, options, promise, against, beyond)
     fixes, abstained = advised.fixes, advised.abstained
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None and lead is None:

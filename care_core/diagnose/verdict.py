@@ -211,7 +211,7 @@ def why_of(shown_by: str, abstained: str | None, otherwise: str) -> str:
     """What stands beside a change: that somebody chose it where nothing is advised, what shows it, or why this one."""
     if abstained:
         return f"chosen by hand; no change is advised: {abstained}"
-    return f"{shown_by} with it" if shown_by else otherwise
+    return f"this run shows it: {shown_by}" if shown_by else otherwise
 
 
 def _advice(diagnosis: Diagnosis) -> Advice:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal, Protocol, TypeVar
 
-from care_core.records import Record
+from care_core.records import Record, replace
 
 Severity = Literal["info", "warning", "critical"]
 FindingKind = Literal[
@@ -144,6 +144,13 @@ class Health(Record):
     findings: tuple[Finding, ...]
     too_little: str = ""
     """Why the log holds too little to say how a run went: it is too short, or no run is in it."""
+    runs: tuple[tuple[float, tuple[Finding, ...]], ...] = ()
+    """Of a log that holds several runs, when each one's part of it ends, and what was found in that part."""
+
+    def of_run(self, start_s: float) -> Health:
+        """The same with the findings of one run alone, that of a log which was begun at this time."""
+        own = next((findings for end_s, findings in self.runs if start_s <= end_s), self.findings)
+        return replace(self, findings=own)
 
 
 NOTHING_SEEN = Health("", (), ())

@@ -22,7 +22,7 @@ SYMPTOMS: frozenset[FindingKind] = frozenset(("attitude", "crash", "estimator", 
 """What shows that something is wrong, not what: told after causes of the same weight."""
 ON_GROUND: frozenset[FindingKind] = frozenset(("prearm",))
 """What is seen before anything runs: no chain of events lies between it and its cause."""
-_SEVERITY = {"critical": 0, "warning": 1, "info": 2}
+GRAVITY = {"critical": 0, "warning": 1, "info": 2}
 
 
 def rank_findings(
@@ -86,7 +86,7 @@ def _place(finding: Finding, every: Iterable[Finding], reach: Explains) -> tuple
 
 def _rank(finding: Finding) -> tuple[bool, int, bool, bool]:
     likely = finding.probability >= LIKELY
-    return finding.after_impact, _SEVERITY[finding.severity], not likely, finding.kind in SYMPTOMS
+    return finding.after_impact, GRAVITY[finding.severity], not likely, finding.kind in SYMPTOMS
 
 
 def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:

@@ -168,7 +168,7 @@ def test_a_change_whose_odds_were_not_measured_says_so() -> None:
     made = made_diagnosis()
     assert made.fix is not None
     shown = replace(made, fix=replace(made.fix, shown_by="pitch oscillates", predicted={}), odds_as_driven=0.05)
-    assert str(verdict_of(shown).advice).endswith(": odds not measured; pitch oscillates with it")
+    assert str(verdict_of(shown).advice).endswith(": odds not measured; this run shows it: pitch oscillates")
     document = build_document(shown)
     assert document.fix is not None
     assert document.fix.odds is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import NamedTuple
 
@@ -25,6 +26,8 @@ READS: Wanted = {
 _EV_ARMED, _EV_DISARMED = 10, 11
 _OPENED_S, _CLOSED_S = 0.5, 2.0
 """A logger writes so shortly before the record of the arming that opened it, and was silent for longer than so."""
+_FEWEST, _TIMES = 10, 10.0
+"""A pause is a closed logger where it is so many times what usually lies between two records."""
 _MOTORS = frozenset((*range(33, 41), *range(82, 86), 70, 73, 74))
 """SERVOn_FUNCTION of motors and throttles (SRV_Channel.h)."""
 _LEAST_PWM, _WORKS_PWM = 1000.0, 150.0
@@ -41,6 +44,8 @@ class ArmChange(NamedTuple):
     """By what or whom, where the record says so."""
     is_forced: bool | None = None
     """None where the log does not say."""
+    read_s: float = math.nan
+    """The time with which its record is read, where that is not its own; not a number where it is."""
 
 
 class Armed(Recorded):
@@ -54,7 +59,11 @@ class Armed(Recorded):
             recorded = [_arm_change(table, row) for row in range(len(table))]
         else:
             by_number = ((_EV_ARMED, True), (_EV_DISARMED, False))
-            recorded = [ArmChange(t, is_armed) for number, is_armed in by_number for t in self.events(number)]
+            recorded = [
+                ArmChange(self._opened_at(t), is_armed, read_s=t) if is_armed else ArmChange(t, is_armed)
+                for number, is_armed in by_number
+                for t in self.events(number)
+            ]
         recorded.sort(key=lambda change: change[:2])
         spoken = unrecorded_changes([change[:2] for change in recorded], self.messages)
         return tuple(sorted((*recorded, *(ArmChange(*change) for change in spoken)), key=lambda change: change[:2]))
@@ -83,6 +92,16 @@ class Armed(Recorded):
         if start is not None:
             spans.append((start, self.end_s))
         return tuple(span for span in spans if span[1] > span[0])
+
+    def _opened_at(self, t: float) -> float:
+        """When an arming was recorded that opened the logger: firmware before 3.4 gives the record no time of its own,
+        so it is read with that of the last one before, however long the logger had been closed."""
+        table = self.one("ATT", "Roll")
+        if table is None or len(table) < _FEWEST:
+            return t
+        place = int(np.searchsorted(table.t, t, "right"))
+        silent = float(table.t[place]) - t if place < len(table) else 0.0
+        return float(table.t[place]) - _OPENED_S if silent > max(_CLOSED_S, _TIMES * median(np.diff(table.t))) else t
 
     def _recorded_before(self, t: float) -> float:
         """The last record of the attitude before the logger was opened at a time; that time where it was open."""

@@ -13,7 +13,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health
 from care_core.ecosystems.plausible import clock_doubt
-from care_core.ecosystems.ranking import rank_findings
+from care_core.ecosystems.ranking import GRAVITY, rank_findings
 from care_core.logs.base import Wanted, merge_needs
 from care_core.records import replace
 
@@ -30,7 +30,7 @@ READS: Wanted = merge_needs(
 
 
 def find(flight: Flight) -> tuple[Finding, ...]:
-    """Findings of a flight, the first cause first, its consequences under it."""
+    """Findings of one run, the first cause first, its consequences under it."""
     flight.expect(READS)
     with np.errstate(all="ignore"):
         found = [finding for check in CHECKS for finding in check.find(flight)]
@@ -53,9 +53,19 @@ def examine(flight: Flight) -> Health:
     """What happened in a DataFlash or telemetry log."""
     tables = flight.sound(READS)
     is_readable = flight.end_s >= _TOO_SHORT_S and any(name in tables for name in _TELLING)
-    findings = find(flight) if is_readable else ()
+    found = [(run.end_s, find(run)) for run in flight.runs] if is_readable else []
+    findings = _told_once(one for _, of_run in found for one in of_run)
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
     if not too_little and all(one.severity == "info" for one in findings):
         # Times that cannot be are no reason to keep quiet about what was found, but none to call the rest fine.
         too_little = clock_doubt(MESSAGES, tables, 0.0, flight.end_s)
-    return Health(flight.vehicle.title, timeline.timeline(flight, tables.values()), findings, too_little)
+    told = timeline.timeline(flight, tables.values())
+    return Health(flight.vehicle.title, told, findings, too_little, tuple(found) if len(found) > 1 else ())
+
+
+def _told_once(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The findings of all runs, the severest first; a note that each run brings stands once."""
+    told: dict[tuple[str, float | None], Finding] = {}
+    for one in findings:
+        told.setdefault((one.title, None if one.severity == "info" else one.onset_s), one)
+    return tuple(sorted(told.values(), key=lambda one: GRAVITY[one.severity]))

@@ -15,6 +15,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot import airborne, armed, recorded, sources
 from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M, FOLLOWED_DEG, Airborne
 from care_core.ecosystems.ardupilot.battery import Battery
+from care_core.ecosystems.ardupilot.one_run import OneRun, windows_of
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, runs
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.liveness import Frozen
@@ -45,6 +46,17 @@ class Flight(Airborne):
     """One log. Times are seconds since its start; spans are (start, end). What it does not hold is None or empty."""
 
     reads = READS
+
+    @cached_property
+    def runs(self) -> tuple[Flight, ...]:
+        """Each run of the log as a flight of its own; this one where it holds no two."""
+        read = {one.time_s: one.time_s if math.isnan(one.read_s) else one.read_s for one in self.arm_changes}
+        windows = windows_of([(read.get(start, start), end) for start, end in self.recorded_armed], self.end_s)
+        return (self,) if len(windows) == 1 else tuple(Flight(OneRun(self, window)) for window in windows)
+
+    def run_at(self, t: float) -> Flight:
+        """The run to which a time belongs."""
+        return next((run for run in self.runs if t <= run.end_s), self)
 
     @cached_property
     def held(self) -> tuple[Span, ...]:

@@ -52,7 +52,10 @@ class ArduPilotFlight(MissionKind):
         if not flight.arm_changes and flight.refusals:
             spans = [(0.0, flight.end_s, True)]
         kept = _sound(flight, tables)
-        return tuple(Mission(model, kept, start_s, end_s, has_ended, spec) for start_s, end_s, has_ended in spans)
+        return tuple(
+            Mission(flight.run_at(start_s), kept, start_s, end_s, has_ended, spec)
+            for start_s, end_s, has_ended in spans
+        )
 
     def mismatch(self, mission: Mission) -> str:
         expected = mission.spec.get("waypoints", ())
