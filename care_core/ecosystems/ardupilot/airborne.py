@@ -40,6 +40,8 @@ FOLLOWED_DEG, _BACK_S = 15.0, 5.0
 """Within this of its demand for so long in the air, it had come back."""
 _OVER_DEG = 70.0
 """No copter leans this far in any mode but acro, sport and flip: ANGLE_MAX is at most 80, 30 to 45 as shipped."""
+_TAKEOFF_S = 15.0
+"""A take-off takes no longer."""
 _LIFTING = 0.2
 """Throttle above which a copter is about to lift; MOT_SPIN_MIN and what armed motors idle at is below."""
 AIRBORNE_M = 1.0
@@ -63,6 +65,8 @@ _HIT_LOST_S = 10.0
 _FAST_MS, _STILL = 5.0, 2.0
 """A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
 _SIMULATED_HIT = re.compile(r"SIM Hit ground at (\d+(?:\.\d+)?) m/s")
+_BEFORE_OVER_S = 2.0
+"""Motors that worked so shortly before a copter lay on its back turned it over, or let it fall."""
 _TAXIES_MS = 8.0
 """Faster over ground, a plane flies or is about to; against a gale its height tells."""
 _TUMBLING_DEG, _TUMBLES_S = 45.0, 2.0
@@ -184,8 +188,7 @@ class Airborne(Armed):
             return None
         t, error = off_demand
         off = (error > _OUT_OF_CONTROL_DEG) | (leans[1] > _OVER_DEG)
-        before_flight = t < (up[0][0] if up else math.inf)
-        matters = during(((start - 1.0, end) for start, end in up), t) | before_flight
+        matters = during(((start - 1.0, end) for start, end in up), t) | during(self._lifting_off, t)
         flying = during(up, t)
         held = (error < FOLLOWED_DEG) & flying
         back = runs(t, held, gap_s=0.5)
@@ -203,7 +206,34 @@ class Airborne(Armed):
             flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
-        return None
+        return self._overturned_s
+
+    @property
+    def _lifting_off(self) -> Iterator[Span]:
+        """Spans on the ground, before it flew, in which its motors were first to lift it: later it was not meant to."""
+        flew_s = self.airborne[0][0] if self.airborne else math.inf
+        for start, end in self.armed:
+            begun = _first_above(self.throttle, _LIFTING, start, end)
+            lifts = (
+                (begun, begun + _TAKEOFF_S) if begun is not None else (start, end) if self.throttle is None else None
+            )
+            if lifts is not None and lifts[0] < flew_s:
+                yield lifts[0], min(lifts[1], end, flew_s)
+
+    @property
+    def _overturned_s(self) -> float | None:
+        """When a copter whose motors had just worked turned over, and lay on its back to the end; None where it did
+        not: whatever its height says, that is no landing."""
+        assert self.tilt is not None
+        t, tilt = self.tilt
+        if not self.armed:
+            return None
+        over = runs(t, (tilt > UPSIDE_DOWN_DEG) & (t >= self.armed[0][0]), gap_s=_STRUCK_S)
+        if not over or over[-1][1] < t[-1] - _STRUCK_S or over[-1][1] - over[-1][0] < _STRUCK_S:
+            return None
+        start = over[-1][0]
+        before = t[(t > start - _BEFORE_OVER_S) & (t <= start)]
+        return start if self._is_driven(before).any() else None
 
     def _reaches_after(self, time_s: float) -> bool:
         """Whether it reached another waypoint after a time, before it was disarmed: that is steered."""
@@ -371,6 +401,15 @@ class Airborne(Armed):
         if lost is not None:
             shock = self.shock_after(lost - _STRUCK_S)
         return lost is not None and shock is not None and shock < lost
+
+
+def _first_above(series: tuple[Floats, Floats] | None, least: float, start: float, end: float) -> float | None:
+    """When a series is first above a value in a span."""
+    if series is None:
+        return None
+    t, values = series
+    above = t[(t >= start) & (t <= end) & (values > least)]
+    return float(above[0]) if len(above) else None
 
 
 def _after(series: tuple[Floats, Floats] | None, at: float) -> Floats:

@@ -21,6 +21,8 @@ READS: Wanted = {
     "POS": ("RelHomeAlt",),
     "ATT": ("Roll",),
     "RCOU": tuple(f"C{n}" for n in range(1, 15)),
+    "BARO": ("Alt",),
+    "GPS": ("Alt", "Status"),
 }
 
 _EV_ARMED, _EV_DISARMED = 10, 11
@@ -28,6 +30,9 @@ _OPENED_S, _CLOSED_S = 0.5, 2.0
 """A logger writes so shortly before the record of the arming that opened it, and was silent for longer than so."""
 _FEWEST, _TIMES = 10, 10.0
 """A pause is a closed logger where it is so many times what usually lies between two records."""
+_NEAR_HOME_M = 50.0
+_ALIVE_M, _ON_GROUND_M, _APART_M, _FIX = 0.05, 1.2, 3.0, 3
+"""A barometer that moves by more lives, and by less than the second on the ground, propellers and all."""
 _MOTORS = frozenset((*range(33, 41), *range(82, 86), 70, 73, 74))
 """SERVOn_FUNCTION of motors and throttles (SRV_Channel.h)."""
 _LEAST_PWM, _WORKS_PWM = 1000.0, 150.0
@@ -152,23 +157,56 @@ class Armed(Recorded):
 
     @property
     def height(self) -> tuple[Floats, Floats] | None:
-        """Time and height (m) above where it was armed, as estimated by the vehicle."""
-        if self._height is None:
-            return None
-        table, column, zero = self._height
-        return table.t, table[column] - zero
+        """Time and height (m) above where it was armed, as estimated by the vehicle; by its barometer where that tells
+        that it never left the ground and the estimate alone runs away."""
+        return self.barometer if self._is_runaway else self.estimated_height
+
+    @property
+    def estimated_height(self) -> tuple[Floats, Floats] | None:
+        """Time and height (m) above where it was armed, as estimated by the vehicle, else by its barometer."""
+        return self._above(self._estimate)
+
+    @property
+    def barometer(self) -> tuple[Floats, Floats] | None:
+        """Time and height (m) above where it was armed, by the barometer."""
+        return self._above(self._first_height(("CTUN", "BAlt"), ("BARO", "Alt")))
 
     @cached_property
-    def _height(self) -> tuple[Table, str, float] | None:
-        """The message and the field that tell the height, and what they say where it was armed."""
-        for name, column in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt")):
-            table = self.one(name, column)
-            if table is not None and len(table) > 1 and np.ptp(table[column]) > 0:
-                start = self.armed[0][0] if self.armed else 0.0
-                before = table[column][table.t <= start + 1.0]
-                zero = float(median(before[-20:])) if len(before) else float(table[column][0])
-                return table, column, zero if abs(zero) < 50 or name == "CTUN" else 0.0
-        return None
+    def _estimate(self) -> tuple[Table, str] | None:
+        return self._first_height(("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"))
+
+    def _first_height(self, *places: tuple[str, str]) -> tuple[Table, str] | None:
+        """The first of these messages and fields that moves."""
+        told = ((self.one(name, column), column) for name, column in places)
+        return next(
+            ((table, column) for table, column in told if table and len(table) > 1 and np.ptp(table[column]) > 0), None
+        )
+
+    def _above(self, known: tuple[Table, str] | None) -> tuple[Floats, Floats] | None:
+        """Time and height above what is told where it was armed; of the height above home, where that is near."""
+        if known is None:
+            return None
+        table, column = known
+        start = self.armed[0][0] if self.armed else 0.0
+        before = table[column][table.t <= start + 1.0]
+        zero = float(median(before[-20:])) if len(before) else float(table[column][0])
+        return table.t, table[column] - (zero if abs(zero) < _NEAR_HOME_M or column != "RelHomeAlt" else 0.0)
+
+    @cached_property
+    def _is_runaway(self) -> bool:
+        """Whether the barometer of a copter, which lives, stays where it was armed while the estimate leaves it, and no
+        receiver tells of a climb."""
+        heard, estimate = self.barometer, self.estimated_height
+        if not self.is_copter or heard is None or estimate is None or not self.armed:
+            return False
+        armed = during(self.armed, heard[0])
+        t, baro = heard[0][armed], heard[1][armed]
+        if len(baro) < _FEWEST or not _ALIVE_M < np.ptp(baro) < _ON_GROUND_M:
+            return False
+        apart = float(np.max(np.abs(np.interp(t, *estimate) - baro)))
+        received = self.one("GPS", "Alt", "Status")
+        fixed = np.empty(0) if received is None else received["Alt"][received["Status"] >= _FIX]
+        return apart > _APART_M and (len(fixed) == 0 or float(np.ptp(fixed)) < _APART_M)
 
 
 def _arm_change(table: Table, row: int) -> ArmChange:

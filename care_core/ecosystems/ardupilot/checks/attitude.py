@@ -30,6 +30,7 @@ READS: Wanted = {
 LIMITS = Limits()
 FAR_DEG = LIMITS.add("roll and pitch off their demand", 15.0, "deg", "half of ArduCopter's crash check")
 _LASTS_S = LIMITS.add("shortest time off the demand", 1.0, "s", "a choice: a gust is over sooner")
+_FLICK_S = LIMITS.add("pause that ends it", 0.3, "s", "a choice: flicks of a stick follow each other more slowly")
 YAW_DEG = LIMITS.add("heading off its demand", 45.0, "deg", "a choice: turns to a new heading come nearer")
 _YAW_LASTS_S = LIMITS.add("shortest time off the heading", 3.0, "s", "a choice")
 _WAVERS_DEG = LIMITS.add("heading that wavers in a turn", 10.0, "deg", "a choice")
@@ -129,7 +130,7 @@ def _far(flight: Flight) -> Iterator[Finding]:
         return
     t, error = flight.lean_error
     levels = during(flight.flown, t) & ~np.isin(flight.modes_at(t), tuple(ACRO))
-    spans = lasting(t, (error > FAR_DEG) & levels, _LASTS_S)
+    spans = lasting(t, (error > FAR_DEG) & levels, _LASTS_S, gap_s=_FLICK_S)
     if spans:
         worst = top(error[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9)
         severity: Severity = "critical" if flight.impact_s is not None else "warning"

@@ -161,15 +161,12 @@ def _unseen_end(mission: Mission) -> Unavailable | None:
 
 
 def _heights(mission: Mission) -> Floats:
-    """Heights above home while armed, shape (n,); none where the log does not tell any."""
-    for channel, fields in HEIGHTS.items():
-        table = mission.table(channel)
-        for field in fields:
-            if table is not None and has(table, field):
-                heights = table[field][np.isfinite(table[field])]
-                if len(heights) and np.ptp(heights) > 0:
-                    return np.asarray(heights - (0.0 if channel == "POS" else heights[0]), dtype=np.float64)
-    return np.empty(0)
+    """Heights above where it was armed, while it was, shape (n,); none where the log does not tell any."""
+    known = flight_of(mission).height
+    if known is None:
+        return np.empty(0)
+    t, height = known
+    return np.asarray(height[(t >= mission.start_s) & (t <= mission.end_s) & np.isfinite(height)], dtype=np.float64)
 
 
 def _touched_down(mission: Mission) -> bool:
