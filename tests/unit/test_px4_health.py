@@ -179,9 +179,9 @@ def test_the_failure_detector_has_the_time_at_which_it_acted() -> None:
         return Px4Flight(MadeLog({"vehicle_status": FLOWN, **topics}))
 
     flags = states(fd_critical_failure=[(0, 0), (42, 1), (43, 0)], fd_motor_failure=[(0, 0), (41, 1)])
-    assert flown(failsafe_flags=flags).gave_up_s((10.0, 60.0)) == 41.0
-    assert flown(failsafe_flags=flags).gave_up_s((10.0, 30.0)) is None
-    assert flown().gave_up_s((10.0, 60.0)) is None
+    assert flown(failsafe_flags=flags).detected_s((10.0, 60.0)) == 41.0
+    assert flown(failsafe_flags=flags).detected_s((10.0, 30.0)) is None
+    assert flown().detected_s((10.0, 60.0)) is None
 
 
 def test_newer_firmware_tells_of_the_heading_in_place_of_the_compass() -> None:

@@ -41,7 +41,7 @@ READS: Wanted = {
 ROTARY, ROVER = 1, 3
 """vehicle_type of what hovers and of a rover (vehicle_status.msg: VEHICLE_TYPE_ROTARY_WING, VEHICLE_TYPE_ROVER)."""
 TERMINATION = 13
-"""nav_state in which the failure detector has ended the flight (vehicle_status.msg)."""
+"""nav_state in which the firmware has ended the flight (vehicle_status.msg)."""
 AIRBORNE_M = 2.0
 BARELY_M = 0.5
 """Rise below which a vehicle never left the ground."""
@@ -154,6 +154,11 @@ class Px4Flight(RunModel):
         said = (t for t, _, text in self.messages if _KILLED.search(text))
         return tuple(t for t in said if any(start <= t <= end for start, end in self.armed))
 
+    def parameter(self, name: str) -> float | None:
+        """The value of a parameter as first driven, None where the log does not hold it."""
+        value = next((one.value for one in self.log.settings().get(name, ())), None)
+        return float(value) if isinstance(value, (int, float)) else None
+
     def killed_s(self, span: Span = (-math.inf, math.inf)) -> float | None:
         """When the kill switch first cut its motors in a span, None where it did not."""
         return next((t for t in self.kills if span[0] <= t <= span[1]), None)
@@ -232,17 +237,20 @@ class Px4Flight(RunModel):
         before = [mode for t, mode in self.modes if t <= span[0]][-1:]
         return [*before, *(mode for t, mode in self.modes if span[0] < t <= span[1])]
 
-    def gave_up_s(self, span: Span) -> float | None:
+    def detected_s(self, span: Span) -> float | None:
         """When the failure detector first acted in a span; None where it did not."""
         times = [self.first_s(FLAGS, name, 1, span) for name in ("fd_critical_failure", "fd_motor_failure")]
-        times.append(self.first_s(STATUS, "nav_state", TERMINATION, span))
-        if TERMINATION in self.modes_during((span[0], span[0])):
-            times.append(span[0])
         status = self.during(STATUS, "failure_detector_status", span)
         if status is not None:
             bits = np.nan_to_num(status["failure_detector_status"]).astype(np.int64) & _GAVE_UP
             times.append(_first_s(status.t, bits != 0))
         return min((one for one in times if one is not None), default=None)
+
+    def terminated_s(self, span: Span) -> float | None:
+        """When the firmware first ended the flight in a span, its motors cut; None where it did not."""
+        if TERMINATION in self.modes_during((span[0], span[0])):
+            return span[0]
+        return self.first_s(STATUS, "nav_state", TERMINATION, span)
 
     def changes(self, topic: str, field: str) -> Iterator[tuple[float, float]]:
         """The first value of a field and every change of it; nothing where the log lacks it."""

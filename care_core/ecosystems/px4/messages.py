@@ -82,7 +82,11 @@ MESSAGES: Dictionary = {
     }),
     "vehicle_attitude": Message({f"q[{n}]": Field(label=f"attitude, quaternion {n}") for n in range(4)}),
     "vehicle_attitude_setpoint": Message({
-        f"q_d[{n}]": Field(label=f"attitude wanted, quaternion {n}") for n in range(4)
+        **{f"q_d[{n}]": Field(label=f"attitude wanted, quaternion {n}") for n in range(4)},
+        "thrust_body[2]": Field(label="thrust wanted, downwards", plausible=(-1.0, 1.0)),
+    }),
+    "vehicle_thrust_setpoint": Message({
+        "xyz[2]": Field(label="thrust wanted, downwards", plausible=(-1.0, 1.0)),
     }),
     "actuator_motors": Message({
         f"control[{n}]": Field(label=f"command of motor {n + 1}", plausible=(-1.0, 1.0)) for n in range(12)

@@ -38,6 +38,7 @@ _SOON_S = 1.0
 """What falls is disarmed as it hits the ground."""
 _HOVERS_S = 5.0
 """A throttle-up on a bench is over sooner."""
+_UNTOLD = Unavailable("the firmware cut its motors, and the log tells no height")
 _CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 
 
@@ -109,8 +110,9 @@ def _checks(flight: Px4Flight, span: Span, *, ended: bool) -> Iterator[Check]:
     silent: Value = _lost_events(flight, span) or 1.0
     no_crash = _no_crash(flight, span)
     yield replace(no_crash, value=silent) if no_crash.value == 1.0 else no_crash
-    failsafe = flight.ever(STATUS, "failsafe", 1, span)
-    yield Check("no_failsafe", 0.0 if failsafe else silent, "no failsafe acted", "a failsafe acted")
+    failsafe_s = flight.first_s(STATUS, "failsafe", 1, span)
+    acted = "" if failsafe_s is None else f"a failsafe acted at {log_time(failsafe_s)}"
+    yield Check("no_failsafe", 0.0 if acted else silent, "no failsafe acted", acted)
     if flies:
         landed = _on_ground(flight, span, ended=ended)
         yield Check("landed", landed, "it was on the ground at the end", "it was disarmed in the air")
@@ -126,17 +128,22 @@ def _lost_events(flight: Px4Flight, span: Span) -> Unavailable | None:
 def _no_crash(flight: Px4Flight, span: Span) -> Check:
     """Whether it stayed in control. What falls after its motors were cut is no failure of its own."""
     killed_s = flight.killed_s(span)
-    gave_up_s = flight.gave_up_s((span[0], min(span[1], math.inf if killed_s is None else killed_s)))
-    was_cut = gave_up_s is None and killed_aloft_s(flight, span) is not None
+    before = (span[0], min(span[1], math.inf if killed_s is None else killed_s))
+    detected_s, ended_s = flight.detected_s(before), flight.terminated_s(before)
+    was_cut = detected_s is None and ended_s is None and killed_aloft_s(flight, span) is not None
     hit, lost = upset.hit(flight), upset.lost_control(flight)
+    aloft_m = None if ended_s is None else flight.height_m(ended_s)
     how = (
         "the kill switch cut its motors in the air" if was_cut
         else f"it hit the ground at {hit.speed_ms:.1f} m/s" if hit is not None and _is_in(span, hit.time_s)
         else "control was lost in the air" if lost is not None and _is_in(span, lost.time_s)
-        else f"the failure detector acted at {log_time(gave_up_s)}" if gave_up_s is not None
+        else f"the failure detector acted at {log_time(detected_s)}" if detected_s is not None
+        else f"the firmware cut its motors in the air at {log_time(ended_s)}, {aloft_m:.1f} m up"
+        if ended_s is not None and aloft_m is not None and aloft_m > BARELY_M
         else ""
     )  # fmt: skip
-    return Check("no_crash", float(not how), "the failure detector stayed silent", how)
+    silent: Value = _UNTOLD if ended_s is not None and aloft_m is None else float(not how)
+    return Check("no_crash", silent if not how else 0.0, "control was kept", how)
 
 
 def _is_in(span: Span, t: float) -> bool:
@@ -176,4 +183,10 @@ def _off_the_ground_s(flight: Px4Flight, span: Span) -> float:
 def _on_ground(flight: Px4Flight, span: Span, *, ended: bool) -> Value:
     if flight.during(LANDED, "landed", span) is None:
         return Unavailable("the log does not say when it was on the ground", f"record {LANDED}", LANDED)
-    return float(flight.last(LANDED, "landed", span[1]) == 1) if ended else _CUT
+    if not ended:
+        return _CUT
+    aloft_m, before = flight.height_m(span[1]), flight.during(LANDED, "landed", (-math.inf, span[1]))
+    was_aloft = before is not None and len(before) > 0 and before["landed"][-1] == 0
+    if was_aloft and aloft_m is not None and aloft_m > AIRBORNE_M:
+        return 0.0  # disarming itself says that it landed
+    return float(flight.last(LANDED, "landed", span[1]) == 1)

@@ -1,0 +1,128 @@
+"""Thrust at its end that does not give the vertical speed that is wanted: too little lift, or lift that nothing ends.
+
+The position controller asks for a vertical speed (vehicle_local_position_setpoint.vz) and, for it, for thrust between
+MPC_THR_MIN and MPC_THR_MAX. What is at that end and still far off cannot be held by any gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.px4.flight import POSITION, Px4Flight, Span
+from care_core.logs.base import Wanted
+from care_core.numbers import Floats, median
+from care_core.records import replace
+
+_WANTED, _AIR = "vehicle_local_position_setpoint", "vehicle_air_data"
+_THRUST, _OLD_THRUST = "vehicle_thrust_setpoint", "vehicle_attitude_setpoint"
+READS: Wanted = {
+    POSITION: ("z", "vz"),
+    _WANTED: ("vz",),
+    _AIR: ("baro_alt_meter",),
+    _THRUST: ("xyz[2]",),
+    _OLD_THRUST: ("thrust_body[2]",),
+}
+
+LIMITS = Limits()
+_OFF_MS = LIMITS.add("vertical speed off the wanted one", 0.5, "m/s", "a choice: gusts take less")
+_RISES_MS = LIMITS.add("climb that nobody asked for", 0.3, "m/s", "a choice: what hovers wanders by less")
+_LASTS_S = LIMITS.add("shortest time of it", 3.0, "s", "a choice: a change of height is reached sooner")
+_LONG_S = LIMITS.add("critical time of a climb that nobody asked for", 5.0, "s", "a choice: a gust may carry for less")
+_HEARD = LIMITS.add("share of it that the barometer tells, too", 0.5, "", "a choice: an estimate alone may run away")
+_ALL = LIMITS.add("thrust of all that there is", 0.98, "", "MPC_THR_MAX is 1 as shipped")
+_LEAST = LIMITS.add("least thrust", 0.12, "", "MPC_THR_MIN as shipped")
+_NEAR_LEAST = LIMITS.add("thrust near the least", 0.02, "", "a choice: it is rounded")
+_TRUE = LIMITS.add("probability of a part", 0.5, "", "a choice: a load, and how outputs are set, look the same")
+
+
+class _End(NamedTuple):
+    """Time, whether thrust is at an end and the speed is off, and how fast it sinks, and should."""
+
+    t: Floats
+    holds: np.ndarray
+    sinks: Floats
+    wanted: Floats
+
+
+def find(flight: Px4Flight) -> Iterator[Finding]:
+    """Thrust that does not suffice, and lift that does not end."""
+    driven, thrust = _vertical(flight), _thrust(flight)
+    if driven is None or thrust is None or not flight.hovers:
+        return
+    t, sinks, wanted = driven
+    lift = np.interp(t, *thrust)
+    most, least = flight.parameter("MPC_THR_MAX") or 1.0, flight.parameter("MPC_THR_MIN") or _LEAST
+    lacks = (lift > min(_ALL, most - _NEAR_LEAST)) & (sinks - wanted > _OFF_MS) & (wanted < 0.0)
+    flies_off = (lift < least + _NEAR_LEAST) & (wanted - sinks > _OFF_MS) & (sinks < -_RISES_MS)
+    yield from _told(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust")
+    for risen in _told(
+        flight, _End(t, flies_off, sinks, wanted), "it rises with the motors at their least", "the least"
+    ):
+        yield replace(one, severity="critical" if one.end_s - one.onset_s > _LONG_S else "warning")
+
+
+def _told(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator[Finding]:
+    spans = [span for span in flight.spans(end.t, end.holds) if span[1] - span[0] >= _LASTS_S]
+    flown = [span for span in spans if _is_flown(flight, span) and _is_heard(flight, span)]
+    if flown:
+        start, stop = flown[0]
+        during = (end.t >= start) & (end.t <= stop)
+        climbs, wanted = -float(median(end.sinks[during])), -float(median(end.wanted[during]))
+        yield Finding(
+            kind="thrust",
+            title=title,
+            onset_s=start,
+            end_s=flown[-1][1],
+            severity="warning",
+            evidence=f"{what} for {stop - start:.0f} s: it {_goes(climbs, 's')}, and is to {_goes(wanted)}",
+            source=f"{POSITION}.vz, {_WANTED}.vz, {_THRUST}",
+            probability=_TRUE,
+        )
+
+
+def _is_heard(flight: Px4Flight, span: Span) -> bool:
+    """Whether the barometer tells about as much of a climb as the estimate; of a log that holds none, or hardly any
+    climb, it may."""
+    heights, baro = flight.heights(span), flight.table(_AIR, "baro_alt_meter")
+    if heights is None or baro is None:
+        return baro is None
+    climbed = float(heights["height"][-1])
+    heard = np.interp(span, baro.t, baro["baro_alt_meter"])
+    return abs(climbed) < _LASTS_S * _RISES_MS or float(heard[1] - heard[0]) > _HEARD * climbed
+
+
+def _goes(climbs: float, ending: str = "") -> str:
+    return f"{'climb' if climbs > 0 else 'sink'}{ending} by {abs(climbs):.1f} m/s"
+
+
+def _is_flown(flight: Px4Flight, span: Span) -> bool:
+    return any(start <= span[0] <= end for start, end in flight.armed)
+
+
+def _vertical(flight: Px4Flight) -> tuple[Floats, Floats, Floats] | None:
+    """Time, vertical speed (m/s, downwards) and the one that is wanted; None where the log lacks one."""
+    moved, asked = flight.table(POSITION, "vz"), flight.table(_WANTED, "vz")
+    if moved is None or asked is None:
+        return None
+    known = asked.where(np.isfinite(asked["vz"]))
+    if len(known) < 2:
+        return None
+    wanted = np.interp(moved.t, known.t, known["vz"], left=np.nan, right=np.nan)
+    return moved.t, moved["vz"], wanted
+
+
+def _thrust(flight: Px4Flight) -> tuple[Floats, Floats] | None:
+    """Time and lift that is asked for, 0 to 1."""
+    for topic, field in ((_THRUST, "xyz[2]"), (_OLD_THRUST, "thrust_body[2]")):
+        table = flight.table(topic, field)
+        if table is not None:
+            return table.t, -table[field]
+    return None
+
+
+CHECK = Check("lift", "thrust at its end that does not give the vertical speed wanted", READS, LIMITS, find)
