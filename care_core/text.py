@@ -87,7 +87,7 @@ def log_time(time_s: float | None, digits: int = 1) -> str:
     """A time of a log, or how long one lasts, wherever people read it: 61.3 s, from 100 s on 312.4 s (5:12)."""
     if time_s is None or not math.isfinite(time_s):
         return "an unknown time"
-    shown = round(time_s, digits)
+    shown = round(time_s, digits) + 0.0  # no minus before a zero
     minutes = f" ({_minutes(shown)})" if abs(shown) >= _MINUTES_FROM_S else ""
     return f"{shown:.{digits}f} s{minutes}"
 

@@ -36,6 +36,7 @@ UNPOWERED_V = LIMITS.add(
 )
 _ONE_CELL_V = LIMITS.add("one full cell", 4.4, "V", "voltages of lithium polymer cells, high voltage ones as well")
 _TWO_CELLS_V = LIMITS.add("two cells that lift a vehicle", 6.0, "V", "voltages of lithium polymer cells: 3 V ruin one")
+_TWO_LOW_V = LIMITS.add("two cells that are nearly empty", 6.8, "V", "voltages of lithium polymer cells")
 PROBABILITY = LIMITS.add("probability of a dead source", 0.9, "", "a choice: nothing else repeats to the last bit")
 
 ZERO = "from first to last: it is not connected, not set up, or sees nothing"
@@ -276,10 +277,23 @@ def no_pack(volts: Floats, aloft: Floats) -> str:
         return f"never more than {known.max():.1f} V, and no vehicle runs on that"
     flying = aloft[np.isfinite(aloft)]
     is_of_none = len(flying) >= _RECORDS and bool(np.all((flying > _ONE_CELL_V) & (flying < _TWO_CELLS_V)))
+    if _rises_aloft(known, flying):
+        return f"{known[0]:.2f} V at first and {flying[-1]:.2f} V in the air: no pack gains by flying"
     if not is_of_none or float(known.max()) >= _TWO_CELLS_V:
         return ""
     least = f"{flying.min():.1f} to {flying.max():.1f} V in the air"
     return f"{least}: one cell has {_ONE_CELL_V:g} V at most, and two lift nothing below {_TWO_CELLS_V:g} V"
+
+
+def _rises_aloft(volts: Floats, aloft: Floats) -> bool:
+    """Whether what two empty cells may have only grows, in the air, too."""
+    few = max(len(aloft) // 10, 1)
+    return (
+        len(aloft) >= _RECORDS
+        and _ONE_CELL_V < float(volts.min()) <= float(volts.max()) < _TWO_LOW_V
+        and float(aloft.min()) >= float(volts[0])
+        and float(aloft[-few:].mean()) > float(aloft[:few].mean())
+    )
 
 
 def turned(degrees: Floats) -> float:

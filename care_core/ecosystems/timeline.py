@@ -172,5 +172,5 @@ def _kept(events: Sequence[Event], most: int) -> list[Event]:
         return (order["error"] + 0.5 if is_promoted else order[event.kind]), at
 
     chosen = set(sorted(range(len(events)), key=weight)[: most - 1])
-    rest = Event(math.nan, "message", f"and {len(events) - len(chosen)} more events of less weight", "the log")
+    rest = Event(events[-1].time_s, "message", f"and {len(events) - len(chosen)} more events of less weight", "the log")
     return [*(event for at, event in enumerate(events) if at in chosen), rest]

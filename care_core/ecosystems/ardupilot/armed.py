@@ -22,7 +22,7 @@ READS: Wanted = {
     "ATT": ("Roll",),
     "RCOU": tuple(f"C{n}" for n in range(1, 15)),
     "BARO": ("Alt",),
-    "GPS": ("Alt", "Status"),
+    "GPS": ("Alt", "Status", "Spd"),
 }
 
 _EV_ARMED, _EV_DISARMED = 10, 11
@@ -33,6 +33,8 @@ _FEWEST, _TIMES = 10, 10.0
 _NEAR_HOME_M = 50.0
 _ALIVE_M, _ON_GROUND_M, _APART_M, _FIX = 0.05, 1.2, 3.0, 3
 """A barometer that moves by more lives, and by less than the second on the ground, propellers and all."""
+_MOVES_MS, _AROUND_S = 3.0, 10.0
+"""Faster, it taxies or flies; so long before and after belongs to it."""
 _MOTORS = frozenset((*range(33, 41), *range(82, 86), 70, 73, 74))
 """SERVOn_FUNCTION of motors and throttles (SRV_Channel.h)."""
 _LEAST_PWM, _WORKS_PWM = 1000.0, 150.0
@@ -76,12 +78,14 @@ class Armed(Recorded):
     @cached_property
     def armed(self) -> tuple[Span, ...]:
         """Spans armed. A log that tells of no arming was armed as its status says (STAT of Plane), else all along where
-        it is written while armed only, else where its throttle is up."""
+        it is written while armed only; a plane that needs no arming, while it moves; else where its throttle is up."""
         if self.arm_changes:
             return self.recorded_armed
         status = self.one("STAT", "Armed")
         if status is not None:
             return tuple(runs(status.t, status["Armed"] > 0, gap_s=_CLOSED_S))
+        if self.is_winged and self.setting("ARMING_REQUIRE") == 0:
+            return self._moving()
         return ((0.0, self.end_s),) if self.is_written_armed else self._driven()
 
     @cached_property
@@ -131,6 +135,13 @@ class Armed(Recorded):
             and np.nanmax(table[f"C{n}"]) > (self.setting(f"SERVO{n}_MIN") or _LEAST_PWM) + _WORKS_PWM
             for n in outputs
         )
+
+    def _moving(self) -> tuple[Span, ...]:
+        """From a little before it first moves to a little after it last does; none where no receiver tells."""
+        moved = self.one("GPS", "Spd", "Status")
+        t = np.empty(0) if moved is None else moved.t[(moved["Spd"] > _MOVES_MS) & (moved["Status"] >= _FIX)]
+        span = () if not len(t) else ((max(0.0, float(t[0]) - _AROUND_S), min(self.end_s, float(t[-1]) + _AROUND_S)),)
+        return span if span and span[0][1] - span[0][0] > 2 * _AROUND_S else ()
 
     def _driven(self) -> tuple[Span, ...]:
         throttle = self.throttle

@@ -74,6 +74,8 @@ _SPOOL_DOWN_S = 6.0
 _FLURRY_S, _FLURRY = 1.0, 4
 _SAME_S = 2.0
 _SWITCHED_OFF_S = 0.05
+_FLICKERS_S = 1.0
+"""A land detector that changes its mind sooner has not seen a flight, nor a landing."""
 _IN_AIR_M, _LIFTED_M = 2.0, 0.5
 
 
@@ -127,7 +129,13 @@ def _arming(flight: Flight) -> Iterator[Event]:
             yield Event(change.time_s, "arming", " ".join(filter(None, ("disarmed", how))) + lasted, "ARM")
             armed_at = None
     if not flight.arm_changes and flight.armed:
-        how = "it is written while armed only (LOG_DISARMED 0)" if flight.is_written_armed else "by its throttle"
+        how = (
+            "it is written while armed only (LOG_DISARMED 0)"
+            if flight.is_written_armed
+            else "it needs none (ARMING_REQUIRE 0), and moves"
+            if flight.is_winged and flight.setting("ARMING_REQUIRE") == 0
+            else "by its throttle"
+        )
         yield Event(flight.armed[0][0], "arming", f"armed: the log records no arming, {how}", "the log")
     yield from _refusals(flight)
 
@@ -242,20 +250,23 @@ def _events(flight: Flight) -> Iterator[Event]:
 def _flown(flight: Flight) -> Iterator[Event]:
     """Taking off and landing, as the vehicle's own detector says."""
     for start, end in flight.armed:
-        top = _highest(flight, start, end)
+        top = _highest(flight.run_at(start), start, end)
         if top is not None and top[1] > _IN_AIR_M:
             yield Event(top[0], "flight", f"highest point, {top[1]:.1f} m", "POS")
         if top is not None and top[1] < _LIFTED_M:
             continue  # the land detector of old firmware goes by throttle alone
-        state = ""
+        told: list[Event] = []
         for t, number in flight.event_records:
             what = "took off" if number in _TOOK_OFF else "landed" if number == _LANDED else ""
             is_switched_off = what == "landed" and t > end - _SWITCHED_OFF_S
             if is_switched_off:
                 continue  # disarming says so itself, wherever the vehicle is
-            if what and what != state and (state or what == "took off") and start <= t <= end:
-                yield Event(t, "flight", what, "EV")
-                state = what
+            state = told[-1].text if told else "landed"
+            if what and what != state and start <= t <= end:
+                told.append(Event(t, "flight", what, "EV"))
+            if len(told) > 1 and told[-1].time_s - told[-2].time_s < _FLICKERS_S:
+                del told[-2:]
+        yield from told
 
 
 def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | None:

@@ -33,6 +33,7 @@ from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, level_word
 from care_core.ecosystems.ros.other_robots import other_goals
 from care_core.ecosystems.ros.recoveries import announced, repairs
+from care_core.ecosystems.timeline import counted
 from care_core.logs.ros_message import short_name
 from care_core.numbers import Floats, quantile
 from care_core.text import log_time
@@ -74,7 +75,7 @@ def _recorded(drive: Drive) -> Iterator[Event]:
     if not count:
         yield Event(0.0, "error", "nothing was recorded: there is no message in it", "recording")
         return
-    words = f"{drive.duration_s:.0f} s of {len([1 for times in drive.times.values() if len(times)])} topics"
+    words = f"{drive.duration_s:.0f} s of {counted(len([1 for times in drive.times.values() if len(times)]), 'topic')}"
     yield Event(0.0, "recording", f"the recording begins: {words}", "recording")
     empty = [one.name for one in drive.channels if not one.count and short_name(one.type) not in WITHOUT_STREAM]
     if empty:

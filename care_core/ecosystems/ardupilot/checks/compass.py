@@ -275,10 +275,7 @@ def _implausible(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             onset_s=spans[0][0],
             end_s=spans[-1][1],
             severity="critical" if _rejected(flight, spans[0][0]) else "warning",
-            evidence=(
-                f"length between {worst.min():.0f} and {worst.max():.0f} mGauss (plausible: {_SHORTEST:.0f} to "
-                f"{_LONGEST:.0f})"
-            ),
+            evidence=(f"length {_ranging(worst)} mGauss (plausible: {_SHORTEST:.0f} to {_LONGEST:.0f})"),
             source="MAG; AP_Arming's limits of the field",
             probability=_ODD,
         )
@@ -300,6 +297,12 @@ def _doubted(flight: Flight) -> Iterator[Finding]:
                 probability=_DOUBTED,
             )
             return
+
+
+def _ranging(values: Floats) -> str:
+    """The range of values in whole numbers, in words."""
+    least, most = f"{values.min():.0f}", f"{values.max():.0f}"
+    return least if least == most else f"between {least} and {most}"
 
 
 CHECK = Check("compass", "dead, disturbed or implausible compasses", READS, LIMITS, find)

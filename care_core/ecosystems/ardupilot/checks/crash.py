@@ -57,7 +57,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         steered = _steered(flight, first)
         is_said = told is not None or said is not None
         shown = (
-            "the firmware says: crash" if is_said else "control was lost, then it hit" if lost is not None else "",
+            "the firmware says: crash" if is_said else "control was lost, and it came down" if lost is not None else "",
             "" if flight.hit is None else flight.hit.said,
             steered,
             "a blow came before control was lost" if flight.was_struck else "",

@@ -93,7 +93,7 @@ def crash_of(mission: Mission) -> str:
         return f"it hit the ground at {hit.speed_ms:.1f} m/s"
     impact_s = flight_of(mission).impact_s
     is_own = impact_s is not None and mission.start_s <= impact_s <= mission.end_s + SAID_AFTER_S
-    return "control was lost, then it hit" if is_own else ""
+    return "control was lost, and it came down" if is_own else ""
 
 
 def hit_of(mission: Mission) -> Hit | None:

@@ -60,9 +60,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     lacks = (lift > min(_ALL, most - _NEAR_LEAST)) & (sinks - wanted > _OFF_MS) & (wanted < 0.0)
     flies_off = (lift < least + _NEAR_LEAST) & (wanted - sinks > _OFF_MS) & (sinks < -_RISES_MS)
     yield from _told(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust")
-    for risen in _told(
-        flight, _End(t, flies_off, sinks, wanted), "it rises with the motors at their least", "the least"
-    ):
+    for one in _told(flight, _End(t, flies_off, sinks, wanted), "it rises with the motors at their least", "the least"):
         yield replace(one, severity="critical" if one.end_s - one.onset_s > _LONG_S else "warning")
 
 

@@ -20,6 +20,7 @@ from care_core.ecosystems.ros.messages import (
     ROSOUT,
     SCAN,
     STATUS,
+    WITHOUT_STREAM,
     reading,
     type_of,
 )
@@ -133,7 +134,7 @@ def _comes_in_a_burst(times: Floats, after_s: float) -> bool:
 def _ended(drive: Drive) -> Iterator[Finding]:
     for channel in drive.channels:
         type = type_of(channel)
-        if type in _JUDGED_ELSEWHERE or _CONTACT.search(channel.name):
+        if type in (*_JUDGED_ELSEWHERE, *WITHOUT_STREAM) or _CONTACT.search(channel.name):
             continue
         over = drive.ends_early(channel.name)
         if over is None or drive.duration_s - over[0] < ENDED * drive.duration_s:
