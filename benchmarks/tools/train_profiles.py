@@ -75,9 +75,9 @@ SOURCES = {
     "ardusub": Source(
         ("data/sub/table.tar.xz",),
         "Missions of the ArduSub firmware (of the source of release 4.5.4) in its software-in-the-loop simulator, "
-        "recorded by this project under random configurations and currents: those of 168 dives of 14 settings (mission,"
-        " frame, site) in which no hardware failed; DataFlash logs, read by `care ingest`.",
-        hardware="data/sub/table.csv",
+        "recorded by this project under random configurations, in half of them one to three options off, and currents: "
+        "410 dives of 48 settings (mission, frame, site) in which no hardware failed; DataFlash logs, read by `care "
+        "ingest`.",
     ),
     "px4": Source(
         ("data/px4/table.tar.xz",),

@@ -11,6 +11,7 @@ from care_core.ecosystems.ardupilot import timeline
 from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded
+from care_core.ecosystems.explains import EXPLAINS
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health
 from care_core.ecosystems.plausible import clock_doubt
 from care_core.ecosystems.ranking import GRAVITY, rank_findings
@@ -21,6 +22,9 @@ _TOO_SHORT_S = 2.0
 _OF_SENSORS: frozenset[FindingKind] = frozenset((
     "imu", "compass", "gps", "barometer", "battery", "vibration", "estimator", "attitude",
 ))  # fmt: skip
+_ALT_HOLD = 2
+_UNUSED, _SWITCHED_S = 0.05, 2.0
+"""Probability that what it does not fly by loses a mission; a mode switched to so shortly before did not."""
 _TELLING = ("MODE", "MSG", "ATT", "IMU")
 
 READS: Wanted = merge_needs(
@@ -34,7 +38,21 @@ def find(flight: Flight) -> tuple[Finding, ...]:
     flight.expect(READS)
     with np.errstate(all="ignore"):
         found = [finding for check in CHECKS for finding in check.find(flight)]
-    return rank_findings(_on_a_bench(found) if _is_on_a_bench(flight) else found, flight.down_s)
+    if _is_on_a_bench(flight):
+        return rank_findings(_on_a_bench(found), flight.down_s)
+    idle = _unused_at_the_end(flight)
+    told = [replace(one, mission_lost=_UNUSED) if one.kind in idle else one for one in found]
+    return rank_findings(told, flight.down_s, {**EXPLAINS, **dict.fromkeys(idle, frozenset[FindingKind]())})
+
+
+def _unused_at_the_end(flight: Flight) -> frozenset[FindingKind]:
+    """What a copter does not fly by in the mode in which it was lost: those do not explain that it was. Stabilize and
+    its like know neither place nor height, and AltHold no place (ArduCopter/mode.h: requires_GPS)."""
+    lost = min((t for t in (flight.lost_control_s, flight.impact_s) if t is not None), default=None)
+    mode = None if lost is None else flight.mode_at(lost - _SWITCHED_S)
+    if mode is None or mode.way != "manual" or not flight.is_copter:
+        return frozenset()
+    return frozenset(("gps",)) if mode.number == _ALT_HOLD else frozenset(("gps", "barometer"))
 
 
 def _is_on_a_bench(flight: Flight) -> bool:

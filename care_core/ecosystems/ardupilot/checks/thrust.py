@@ -29,6 +29,7 @@ _SHARE = LIMITS.add("share of the flight at a high throttle", 0.3, "", "a choice
 FULL = LIMITS.add("throttle of all that the motors have", 0.95, "", "a choice: MOT_SPIN_MAX as shipped")
 _FULL_LASTS_S = LIMITS.add("shortest time at full throttle", 3.0, "s", "a choice: a gust is over sooner")
 _BELOW_M = LIMITS.add("height below the one wanted", 2.0, "m", "a choice: height control is within a metre")
+_CLIMBS_MS = LIMITS.add("climb of what has thrust to spare", 1.0, "m/s", "a choice: half of PILOT_SPEED_UP as shipped")
 _GROUNDED_S = LIMITS.add("full throttle on the ground", 5.0, "s", "a choice: a take-off takes less")
 SPIN_MOST = LIMITS.add("MOT_SPIN_MAX that keeps motors down", 0.9, "", "AP_MotorsMulticopter: 0.95 as shipped")
 _FLYING = LIMITS.add("least throttle in the air", 0.05, "", "a choice: above it motors turn")
@@ -54,7 +55,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     level = smooth(t, throttle, 4.0)
     high = lasting(t, flown & (level > HOVER_MOST), _LASTS_S, gap_s=5.0)
-    full = saturated(flight)
+    full = [span for span in saturated(flight) if _below(flight, *span) or not _climbs(flight, *span)]
     if full:
         start, end = full[0][0], full[-1][1]
         below = _below(flight, start, end)
@@ -113,6 +114,15 @@ def _by_option(flight: Flight) -> tuple[SuspectKind, str]:
     if most is not None and 0.0 < most < SPIN_MOST:
         return "parameter", f"; MOT_SPIN_MAX={most:g} keeps the motors from their full output (0.95 is usual)"
     return "hardware", ""
+
+
+def _climbs(flight: Flight, start: float, end: float) -> bool:
+    """Whether it climbs with all its thrust, as a pilot's stick asks."""
+    known = flight.height
+    if known is None:
+        return False
+    low, high = np.interp((start, end), *known)
+    return float(high - low) > _CLIMBS_MS * (end - start)
 
 
 def _below(flight: Flight, start: float, end: float) -> float:

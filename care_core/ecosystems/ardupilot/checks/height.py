@@ -1,0 +1,91 @@
+"""An estimated height that runs away from the barometer's, by which the estimator holds it.
+
+The estimator carries the height on by the accelerometers and corrects it by the barometer (EK3_SRC1_POSZ 1, and before
+4.1 EK2_ALT_SOURCE 0 as shipped). Accelerometers that are far off, or a barometer that it rejects, part them; the
+firmware refuses arming from 1 m on (PREARM_MAX_ALT_DISPARITY_CM).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import lasting, smooth
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+from care_core.numbers import median, quantile
+
+READS: Wanted = {"IMU": ("AccX", "AccY", "AccZ")}
+
+LIMITS = Limits()
+_APART_M = LIMITS.add("estimate off the barometer", 5.0, "m", "five times what arming allows")
+_LASTS_S = LIMITS.add("shortest time of it", 5.0, "s", "a choice: a descent through its own wash is over sooner")
+_GRAVITY = LIMITS.add("gravity", 9.81, "m/s^2", "physics")
+_OFF = LIMITS.add("gravity off, at rest", 0.5, "m/s^2", "a choice: a calibrated accelerometer is within 0.1")
+_REST = LIMITS.add("throttle at rest", 0.05, "", "a choice: motors that idle shake little")
+_TRUE = LIMITS.add("probability that it is so", 0.8, "", "a choice: both are measured; which one is wrong is not")
+_SOURCES = (("EK3_SRC1_POSZ", 1.0), ("EK3_ALT_SOURCE", 0.0), ("EK2_ALT_SOURCE", 0.0))
+"""The value with which the height is that of the barometer."""
+_HELD = frozenset(("hold", "mission", "return", "land", "guided"))
+_ALT_HOLD = 2
+_FEWEST = 20
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """Where estimate and barometer part while it matters."""
+    estimate, heard = flight.estimated_height, flight.barometer
+    if not flight.is_copter or estimate is None or heard is None or not flight.armed or not _is_by_barometer(flight):
+        return
+    t, height = estimate
+    apart = height - np.interp(t, *heard)
+    watched = flight.watch(t)
+    if watched.sum() < _FEWEST or not np.any(apart):
+        return
+    apart = smooth(t, apart - float(median(apart[watched][:_FEWEST])), 3.0)
+    spans = lasting(t, (np.abs(apart) > _APART_M) & watched, _LASTS_S)
+    if not spans:
+        return
+    start, end = spans[0][0], spans[-1][1]
+    most = quantile(np.abs(apart[during(spans, t)]), 0.9)
+    yield Finding(
+        kind="estimator",
+        title="the estimated height runs away from the barometer's",
+        onset_s=start,
+        end_s=end,
+        severity="critical" if _holds_height(flight, start, end) else "warning",
+        evidence=f"they are up to {most:.0f} m apart (limit {_APART_M:g} m){_at_rest(flight)}",
+        source="CTUN.Alt or POS.RelHomeAlt against CTUN.BAlt or BARO.Alt",
+        probability=_TRUE,
+    )
+
+
+def _is_by_barometer(flight: Flight) -> bool:
+    """Whether the height is to be the barometer's."""
+    return all(flight.setting(name) in (None, value) for name, value in _SOURCES)
+
+
+def _holds_height(flight: Flight, start: float, end: float) -> bool:
+    """Whether a mode that goes by the height was in force meanwhile."""
+    return any(mode.way in _HELD or mode.number == _ALT_HOLD for mode in flight.modes_between(start, end))
+
+
+def _at_rest(flight: Flight) -> str:
+    """That the accelerometers do not feel gravity before take-off, in a clause; empty where they do."""
+    table, driven = flight.one("IMU", "AccX", "AccY", "AccZ"), flight.throttle
+    if table is None or driven is None:
+        return ""
+    lifted = driven[0][driven[1] > _REST]
+    still = table.t < (lifted[0] if len(lifted) else np.inf)
+    if still.sum() < _FEWEST:
+        return ""
+    felt = float(median(np.sqrt(sum(table[axis][still] ** 2 for axis in ("AccX", "AccY", "AccZ")))))
+    if abs(felt - _GRAVITY) < _OFF:
+        return ""
+    return f"; at rest the accelerometers feel {felt:.1f} m/s^2, gravity is {_GRAVITY:g}: calibrate them"
+
+
+CHECK = Check("height", "an estimated height that runs away from the barometer's", READS, LIMITS, find)
