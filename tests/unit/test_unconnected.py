@@ -230,3 +230,14 @@ def test_a_px4_flight_under_a_roof_took_off(rise_m: float, lasts_s: float, took_
     checks = {one.name: one.value for one in _checks(Px4Flight(MadeLog(made)), (5.0, 55.0), ended=True)}
     assert (checks["took_off"] == 1.0) is took_off
     assert checks["landed"] == 1.0
+
+
+def test_what_grows_in_flight_is_of_no_pack() -> None:
+    flight = with_volts(6.0)
+    flight.table["BAT"]["Volt"] = np.interp(flight.t, [0.0, flight.t[-1]], [5.93, 6.1])
+    ((severity, title),) = told(flight.find(), "battery")
+    assert (severity, title) == ("info", "no battery monitor is connected: 6.1 V")
+    flight.table["BAT"]["Volt"] = np.interp(
+        flight.t, [0.0, flight.t[-1]], [6.1, 5.93]
+    )  # two cells that are nearly empty
+    assert not [one for one in told(flight.find(), "battery") if "connected" in one[1]]

@@ -51,8 +51,11 @@ class Flight(Airborne):
     def runs(self) -> tuple[Flight, ...]:
         """Each run of the log as a flight of its own; this one where it holds no two."""
         read = {one.time_s: one.time_s if math.isnan(one.read_s) else one.read_s for one in self.arm_changes}
-        windows = windows_of([(read.get(start, start), end) for start, end in self.recorded_armed], self.end_s)
-        return (self,) if len(windows) == 1 else tuple(Flight(OneRun(self, window)) for window in windows)
+        armed = self.recorded_armed
+        windows = windows_of([(read.get(start, start), end) for start, end in armed], self.end_s)
+        if len(windows) == 1:
+            return (self,)
+        return tuple(Flight(OneRun(self, own, start)) for own, (start, _) in zip(windows, armed, strict=True))
 
     def run_at(self, t: float) -> Flight:
         """The run to which a time belongs."""

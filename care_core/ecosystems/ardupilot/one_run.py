@@ -45,6 +45,7 @@ class OneRun(Record, eq=False, dict=True):
 
     whole: RunModel
     window: Span
+    armed_s: float
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.whole.log, name)
@@ -61,8 +62,8 @@ class OneRun(Record, eq=False, dict=True):
         return tuple(one for one in self.whole.log.damage if one.time_s is None or start <= one.time_s <= end)
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
-        """The parameters as they were when it began, and what was changed in it."""
-        return {name: self._since_start(history) for name, history in self.whole.log.settings().items()}
+        """The parameters as they were when it was armed, and what was changed since."""
+        return {name: self._since_armed(history) for name, history in self.whole.log.settings().items()}
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
         """Its rows of the messages."""
@@ -80,8 +81,8 @@ class OneRun(Record, eq=False, dict=True):
             start, end = (float(np.nextafter(t, math.inf)) for t in self.window)
         return table.between(start, end)
 
-    def _since_start(self, history: tuple[Setting, ...]) -> tuple[Setting, ...]:
-        start, end = self.window
-        later = [one for one in history if one.changed_at_s is not None and start < one.changed_at_s <= end]
-        before = [one for one in history if one.changed_at_s is None or one.changed_at_s <= start]
+    def _since_armed(self, history: tuple[Setting, ...]) -> tuple[Setting, ...]:
+        changed = [(-math.inf if one.changed_at_s is None else one.changed_at_s, one) for one in history]
+        before = [one for t, one in changed if t <= self.armed_s]
+        later = [one for t, one in changed if self.armed_s < t <= self.window[1]]
         return (*before[-1:], *later) or history[:1]

@@ -1,0 +1,50 @@
+"""An estimated height that runs away from the barometer, and a copter that never left the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from care_core.ecosystems.findings import every_finding
+from tests.flights import UP_S, Made
+
+TITLE = "the estimated height runs away from the barometer's"
+
+
+def drifting(metres: float) -> Made:
+    made = Made()
+    away = np.interp(made.t, [20.0, 80.0], [0.0, metres])
+    made.table["CTUN"]["Alt"] += away
+    made.table["POS"]["RelHomeAlt"] += away
+    return made
+
+
+@pytest.mark.parametrize(("metres", "is_told"), [(3.0, False), (30.0, True)])
+def test_an_estimate_that_leaves_the_barometer(metres: float, is_told: bool) -> None:
+    assert (TITLE in [one.title for one in every_finding(drifting(metres).find())]) is is_told
+
+
+def test_accelerometers_that_do_not_feel_gravity_are_told_with_it() -> None:
+    made = drifting(30.0)
+    for table in ("IMU", "IMU#2"):
+        made.table[table]["AccZ"] += 1.6
+    finding = next(one for one in every_finding(made.find()) if one.title == TITLE)
+    assert "at rest the accelerometers feel 8.2 m/s^2" in finding.evidence
+    assert finding.severity == "critical"  # Loiter goes by the height
+
+
+def test_a_height_by_another_source_may_leave_the_barometer() -> None:
+    made = drifting(30.0)
+    made.settings["EK3_SRC1_POSZ"] = 3
+    assert TITLE not in [one.title for one in every_finding(made.find())]
+
+
+def test_a_barometer_on_the_ground_is_believed_before_an_estimate_that_runs_away() -> None:
+    made = Made()
+    for name in ("BARO", "BARO#2"):
+        made.table[name]["Alt"] = made.noise(0.1)
+    made.table["CTUN"]["BAlt"] = made.noise(0.1)
+    made.table["GPS"]["Alt"] = 400.0 + made.noise(0.3)
+    assert made.flight().airborne == ()
+    made.table["GPS"]["Alt"] = 400.0 + np.interp(made.t, [UP_S, UP_S + 6], [0.0, 12.0])  # the receiver tells of a climb
+    assert made.flight().airborne != ()

@@ -1,0 +1,84 @@
+"""PX4: thrust at its end that does not give the vertical speed wanted, and flights that end above the ground."""
+
+from __future__ import annotations
+
+import pytest
+
+from care_core.ecosystems.findings import every_finding
+from care_core.ecosystems.px4.examining import examine
+from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.px4.missions import _checks
+from care_core.logs.base import Table
+from care_core.run import Unavailable
+from tests.unit.test_px4_health import FLOWN, MadeLog, states
+
+ARMED = (10.0, 50.0)
+
+
+def found(lift: float, sinks: float, wanted: float, lasts_s: float, baro: float = 1.0) -> list[tuple[str, str]]:
+    """Findings of a flight that hovers, and from 20 s on, for a time, is asked for a lift and sinks so fast (m/s)."""
+    end = 20.0 + lasts_s
+    steps = [(0.0, 0.0), *((20.0 + 0.1 * n, sinks * 0.1 * n) for n in range(int(10 * lasts_s)))]
+    log = MadeLog({
+        "vehicle_status": FLOWN,
+        "vehicle_local_position": states(z=[(0, 0.0), *((t, -5.0 + z) for t, z in steps[1:])],
+                                         vz=[(0, 0.0), (20, sinks), (end, 0.0)]),
+        "vehicle_local_position_setpoint": states(vz=[(0, 0.0), (20, wanted), (end, 0.0)]),
+        "vehicle_thrust_setpoint": states(**{"xyz[2]": [(0, -0.5), (20, -lift), (end, -0.5)]}),
+        "vehicle_air_data": states(baro_alt_meter=[(0, 400.0), *((t, 405.0 - baro * z) for t, z in steps[1:])]),
+    })  # fmt: skip
+    return [
+        (one.severity, one.title) for one in every_finding(examine(Px4Flight(log)).findings) if one.kind == "thrust"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("lift", "sinks", "wanted", "lasts_s", "told"),
+    [
+        (1.0, -0.2, -1.5, 8.0, [("warning", "too little thrust")]),
+        (1.0, -1.4, -1.5, 8.0, []),  # it climbs as it is told
+        (0.9, -0.2, -1.5, 8.0, []),  # there is thrust left
+        (1.0, -0.2, -1.5, 2.0, []),
+        (0.12, -1.5, 1.8, 8.0, [("critical", "it rises with the motors at their least")]),
+        (0.12, -1.5, 1.8, 4.0, [("warning", "it rises with the motors at their least")]),
+        (0.12, 1.5, 1.8, 8.0, []),  # it sinks as it is told
+    ],
+)
+def test_thrust_at_its_end(
+    lift: float, sinks: float, wanted: float, lasts_s: float, told: list[tuple[str, str]]
+) -> None:
+    assert found(lift, sinks, wanted, lasts_s) == told
+
+
+def test_a_climb_of_the_estimate_alone_is_none() -> None:
+    assert found(0.12, -1.5, 1.8, 8.0, baro=0.1) == []
+
+
+def checked(**topics: Table) -> dict[str, tuple[object, str]]:
+    flight = Px4Flight(MadeLog({"vehicle_status": FLOWN, **topics}))
+    return {one.name: (one.value, one.otherwise) for one in _checks(flight, ARMED, ended=True)}
+
+
+def heights(up_m: float) -> Table:
+    return states(z=[(0, 0.0), (12, -up_m)])
+
+
+TERMINATED = states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 4), (40, 13)], failsafe=[(0, 0), (40, 1)])
+
+
+def test_a_flight_that_the_firmware_ended_in_the_air() -> None:
+    found = checked(vehicle_status=TERMINATED, vehicle_local_position=heights(6.0))
+    assert found["no_crash"] == (0.0, "the firmware cut its motors in the air at 40.0 s, 6.0 m up")
+    assert found["no_failsafe"] == (0.0, "a failsafe acted at 40.0 s")
+
+
+def test_one_that_it_ended_on_the_ground_has_not_crashed() -> None:
+    assert checked(vehicle_status=TERMINATED, vehicle_local_position=heights(0.1))["no_crash"][0] == 1.0
+    assert isinstance(checked(vehicle_status=TERMINATED)["no_crash"][0], Unavailable)  # nobody knows where it was
+
+
+@pytest.mark.parametrize(("landed_s", "landed"), [(49.0, 1.0), (50.3, 0.0)])
+def test_disarming_itself_is_no_landing(landed_s: float, landed: float) -> None:
+    detected = states(landed=[(0, 1), (12, 0), (landed_s, 1)])
+    found = checked(vehicle_land_detected=detected, vehicle_local_position=heights(3.0))
+    assert found["landed"] == (landed, "it was disarmed in the air")
