@@ -542,7 +542,8 @@ def test_a_log_too_slow_to_show_each_swing_shows_that_they_come_out_even() -> No
 def test_coming_down_and_staying_there_is_told() -> None:
     made = Made()
     down = made.after(FAILS_S)
-    made.table["POS"]["RelHomeAlt"][down] = made.table["CTUN"]["Alt"][down] = 0.0
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt")):
+        made.table[name][field][down] = 0.0
     made.table["CTUN"]["ThO"][down] = 0.7
     made.table["CTUN"]["DAlt"][down] = 12.0
     found = {one.title: one for one in made.find()}

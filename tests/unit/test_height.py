@@ -13,6 +13,7 @@ TITLE = "the estimated height runs away from the barometer's"
 
 def drifting(metres: float) -> Made:
     made = Made()
+    made.table["GPS"]["Status"][:] = 1.0  # no receiver tells
     away = np.interp(made.t, [20.0, 80.0], [0.0, metres])
     made.table["CTUN"]["Alt"] += away
     made.table["POS"]["RelHomeAlt"] += away
@@ -48,3 +49,11 @@ def test_a_barometer_on_the_ground_is_believed_before_an_estimate_that_runs_away
     assert made.flight().airborne == ()
     made.table["GPS"]["Alt"] = 400.0 + np.interp(made.t, [UP_S, UP_S + 6], [0.0, 12.0])  # the receiver tells of a climb
     assert made.flight().airborne != ()
+
+
+def test_a_barometer_that_leaves_the_receiver_and_the_estimate_is_no_runaway() -> None:
+    made = Made()
+    away = np.interp(made.t, [20.0, 80.0], [0.0, 30.0])
+    for name, field in (("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt")):
+        made.table[name][field] += away
+    assert TITLE not in [one.title for one in every_finding(made.find())]

@@ -12,14 +12,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 from care_core.numbers import median, quantile
 
-READS: Wanted = {"IMU": ("AccX", "AccY", "AccZ")}
+READS: Wanted = {"IMU": ("AccX", "AccY", "AccZ"), "GPS": ("Alt", "Status")}
 
 LIMITS = Limits()
 _APART_M = LIMITS.add("estimate off the barometer", 5.0, "m", "five times what arming allows")
@@ -32,6 +32,7 @@ _SOURCES = (("EK3_SRC1_POSZ", 1.0), ("EK3_ALT_SOURCE", 0.0), ("EK2_ALT_SOURCE", 
 """The value with which the height is that of the barometer."""
 _HELD = frozenset(("hold", "mission", "return", "land", "guided"))
 _ALT_HOLD = 2
+_FIX = 3
 _FEWEST = 20
 
 
@@ -47,7 +48,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     apart = smooth(t, apart - float(median(apart[watched][:_FEWEST])), 3.0)
     spans = lasting(t, (np.abs(apart) > _APART_M) & watched, _LASTS_S)
-    if not spans:
+    if not spans or _receiver_agrees(flight, spans):
         return
     start, end = spans[0][0], spans[-1][1]
     most = quantile(np.abs(apart[during(spans, t)]), 0.9)
@@ -66,6 +67,18 @@ def find(flight: Flight) -> Iterator[Finding]:
 def _is_by_barometer(flight: Flight) -> bool:
     """Whether the height is to be the barometer's."""
     return all(flight.setting(name) in (None, value) for name, value in _SOURCES)
+
+
+def _receiver_agrees(flight: Flight, spans: list[Span]) -> bool:
+    """Whether the receiver's height is nearer to the estimate than to the barometer meanwhile: then that drifts."""
+    received, estimate, heard = flight.one("GPS", "Alt", "Status"), flight.estimated_height, flight.barometer
+    fixed = None if received is None else received.where((received["Status"] >= _FIX) & flight.watch(received.t))
+    if fixed is None or estimate is None or heard is None or not len(fixed):
+        return False
+    told = during(spans, fixed.t)
+    climbed = fixed["Alt"] - float(median(fixed["Alt"][:_FEWEST]))
+    off = [float(median(np.abs(climbed - np.interp(fixed.t, *known))[told])) for known in (estimate, heard)]
+    return bool(told.any()) and off[0] < off[1]
 
 
 def _holds_height(flight: Flight, start: float, end: float) -> bool:

@@ -154,9 +154,13 @@ def _nameless(columns: Mapping[str, Floats]) -> tuple[Motor, ...]:
 def _range(flight: Flight, seen: float) -> tuple[float, float]:
     """Pulse widths (microseconds) of an idle output and of the most that one may be asked for, `seen` at most."""
     low = flight.setting("MOT_PWM_MIN", "Q_M_PWM_MIN") or flight.setting("RC3_MIN", "THR_MIN_PWM") or 1000.0
-    high = flight.setting("MOT_PWM_MAX", "Q_M_PWM_MAX") or flight.setting("RC3_MAX") or 2000.0
+    known = flight.setting("MOT_PWM_MAX", "Q_M_PWM_MAX") or flight.setting("RC3_MAX")
+    high = known or 2000.0
     most = flight.setting("MOT_SPIN_MAX", "Q_M_SPIN_MAX")
     top = low + (high - low) * (most if most is not None and 0.5 < most <= 1.0 else 1.0)
+    if known and flight.is_copter:
+        return low, top
+    # Lift motors are throttled where wings carry: what they are asked for at most is what they may be asked for.
     return low, min(top, max(seen, low + 0.6 * (high - low)))
 
 
@@ -235,7 +239,8 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         asked = _of_one(_excess(outputs, since), n)
         size = float(median(asked))
         stays = float(above[t >= spans[0][0]].mean()) > _STAYS
-        steady = size > max(0.7 * ALONE, _STEADY * float(np.std(asked)))
+        swings = float(np.std(asked - _of_one(_smooth_excess(outputs, since, window), n)))  # not what grows
+        steady = size > max(0.7 * ALONE, _STEADY * swings)
         has_room = float(median(np.delete(share, n, axis=0))) < (_ROOM_FLYING if flight.flown else _ROOM)
         if stays and steady and has_room and (best is None or size > best[0]):
             best = (size, n, spans[0][0], spans[-1][1])
