@@ -107,9 +107,11 @@ def no_stand_out(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], n
         necessary: share of this configuration's failures that it takes away.
     """
     chance = sum(one.probability for one in hypotheses if one.what == "chance")
+    unknown = sum(one.probability for one in hypotheses if one.what == "parameter" and not one.name)
+    least = max(chance, unknown)
     changed = {change.option.name for change in fix.changes}
     leader = _leader(hypotheses)
-    is_cause = any(one.name in changed and one.probability > chance for one in hypotheses if one.what == "parameter")
+    is_cause = any(one.name in changed and one.probability > least for one in hypotheses if one.what == "parameter")
     if is_cause and (leader in changed or necessary >= NECESSARY.value):
         return None
     odds = f"with {_changes(fix)} the odds are {percent(fix.p_fixed)}, as driven {percent(as_driven)}"

@@ -594,7 +594,8 @@ def _breaks(starts: Offsets, size: Bytes) -> NDArray[np.intp]:
 
 def _gap_text(low: int, high: int, size: int) -> str:
     if high == size and high - low < _LONGEST_RECORD:
-        return f"the log breaks off inside a record, its last {high - low} bytes"
+        last = f"{high - low} bytes" if high - low > 1 else "byte"
+        return f"the log breaks off inside a record, its last {last}"
     where = "at the end " if high == size else ""
     return f"{high - low} bytes {where}are not readable records"
 

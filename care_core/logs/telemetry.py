@@ -206,6 +206,14 @@ def _home(log: _Telemetry) -> Table | None:
     return Table(table.t, here)
 
 
+def _status(log: _Telemetry) -> Table | None:
+    """STAT: whether it was armed, by each heartbeat."""
+    beats = log.heartbeats
+    if beats is None:
+        return None
+    return Table(beats.t, {"Armed": ((beats["base_mode"].astype(np.int64) & _ARMED_FLAG) > 0).astype(np.float64)})
+
+
 def _armings(log: _Telemetry) -> Table | None:
     """ARM: every change of the armed flag, halfway between the two heartbeats. One already set at the first is no
     arming, since when that was is not in the log."""
@@ -324,8 +332,8 @@ def _to_table(rows: Iterable[Sample], fields: tuple[str, ...]) -> Table | None:
 
 
 _MADE: Mapping[str, Callable[[_Telemetry], Table | None]] = {
-    "ATT": _attitude, "BAT": _batteries, "ORGN": _home, "ARM": _armings, "MODE": _modes, "MSG": _messages,
-    "CMD": _items,
+    "ATT": _attitude, "BAT": _batteries, "ORGN": _home, "ARM": _armings, "STAT": _status, "MODE": _modes,
+    "MSG": _messages, "CMD": _items,
 }  # fmt: skip
 _SOURCES: Mapping[str, tuple[str, ...]] = {
     **{name: (message,) for name, (message, _) in _AS_SENT.items()},
@@ -333,6 +341,7 @@ _SOURCES: Mapping[str, tuple[str, ...]] = {
     "BAT": ("BATTERY_STATUS", "SYS_STATUS"),
     "ORGN": ("HOME_POSITION",),
     "ARM": ("HEARTBEAT",),
+    "STAT": ("HEARTBEAT",),
     "MODE": ("HEARTBEAT",),
     "MSG": ("STATUSTEXT", "MISSION_ITEM_REACHED", "MISSION_CURRENT"),
     "CMD": ("MISSION_ITEM_INT", "MISSION_ITEM"),

@@ -65,6 +65,11 @@ class Must(Record):
             return f"{RELATIONS[self.relation][0]} {self.right}{known}"
         return f"{self.left} ({values[self.left]:g}) {RELATIONS[self.relation][0]} it"
 
+    def value_of(self, name: str) -> float | None:
+        """The one number that it leaves to a parameter, None where it leaves a choice."""
+        is_one = self.relation == "=" and name == self.left and not _NAME.fullmatch(self.right)
+        return _number(self.right, {}) if is_one else None
+
 
 class RefusalReads(Record):
     """What the check behind a refusal reads, by the names that the vehicle has."""

@@ -105,7 +105,8 @@ def test_a_barometer_that_freezes_on_the_way_down_is_named() -> None:
 def test_a_frozen_receiver_leads_and_no_barometer_is_blamed_for_it() -> None:
     flight = made()
     climbing = np.interp(flight.t, [20, 60, 90, 99], [12, 60, 60, 0]) * (flight.t > 20)
-    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("BARO", "Alt"), ("BARO#2", "Alt"), ("GPS", "Alt")):
+    heights = (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt"))
+    for name, field in (*heights, ("GPS", "Alt")):
         flight.table[name][field] += climbing
     freeze(flight, "GPS")
     findings = flight.find()

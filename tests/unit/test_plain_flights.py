@@ -215,8 +215,9 @@ def test_what_is_over_or_a_landing_without_its_target_is_no_failsafe(text: str, 
 
 def test_a_land_detector_is_believed_over_a_barometer_that_drifted() -> None:
     position = flight()["POS"]
-    columns = {**position.columns, "RelHomeAlt": position["RelHomeAlt"] + 5.0}
     end_s = flown(mode=0).end_s
+    drifted = np.interp(position.t, [end_s - 20.0, end_s - 10.0], [0.0, 5.0])
+    columns = {**position.columns, "RelHomeAlt": position["RelHomeAlt"] + drifted}
 
     def landed(detected_s: float, number: int = 18) -> Value:
         events = table([(detected_s, number)], "Id")

@@ -178,6 +178,11 @@ class Armed(Recorded):
         return self._above(self._estimate)
 
     @property
+    def controlled_height(self) -> tuple[Floats, Floats] | None:
+        """Time and height (m) above where it was armed, as its height controller has it."""
+        return self._above(self._first_height(("CTUN", "Alt")))
+
+    @property
     def barometer(self) -> tuple[Floats, Floats] | None:
         """Time and height (m) above where it was armed, by the barometer."""
         return self._above(self._first_height(("CTUN", "BAlt"), ("BARO", "Alt")))

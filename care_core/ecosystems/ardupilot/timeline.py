@@ -250,7 +250,10 @@ def _events(flight: Flight) -> Iterator[Event]:
 def _flown(flight: Flight) -> Iterator[Event]:
     """Taking off and landing, as the vehicle's own detector says."""
     for start, end in flight.armed:
-        top = _highest(flight.run_at(start), start, end)
+        own = flight.run_at(start)
+        top = _highest(own, start, end)
+        if own.is_copter and own.throttle is not None and not own.airborne:
+            continue  # no height without thrust
         if top is not None and top[1] > _IN_AIR_M:
             yield Event(top[0], "flight", f"highest point, {top[1]:.1f} m", "POS")
         if top is not None and top[1] < _LIFTED_M:

@@ -8,6 +8,7 @@ degrees (AP_COMPASS_MAX_XYZ_ANG_DIFF); of the field's length 30 % may come from 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -70,6 +71,9 @@ _MOTORS = LIMITS.add("probability of a field that follows the motors", 0.5, "", 
 _MOTORS_MUCH = LIMITS.add("probability of one that follows them much", 0.7, "", "a choice")
 _ODD = LIMITS.add("probability of a field that the Earth does not have", 0.5, "", "a choice: steel is near, or not")
 _DOUBTED = LIMITS.add("probability where the estimator alone doubts it", 0.2, "", "a choice: mostly others are wrong")
+
+
+_FIELD_WORDS = re.compile("mag field|compass|mag anomaly", re.IGNORECASE)
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -211,7 +215,8 @@ def _refused(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     calibrated, or was and wants a restart, is not wrong, nor one beside a parameter that cannot hold."""
     begin = flight.refused_for("mag field", "compass", "mag anomaly", but="calibrat")
     if begin is not None and not any(one.is_shown for one in refusing(flight)):
-        said = next(text for t, text in flight.messages if t == begin)
+        told = [one.text for one in flight.refusals if one.time_s == begin]
+        said = next((text for text in told if _FIELD_WORDS.search(text)), told[0])
         yield Finding(
             kind="compass",
             title="the firmware finds the compass wrong",

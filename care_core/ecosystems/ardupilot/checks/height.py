@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during
+from care_core.ecosystems.ardupilot.spans import Floats, Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
@@ -33,26 +33,38 @@ _SOURCES = (("EK3_SRC1_POSZ", 1.0), ("EK3_ALT_SOURCE", 0.0), ("EK2_ALT_SOURCE", 
 _HELD = frozenset(("hold", "mission", "return", "land", "guided"))
 _ALT_HOLD = 2
 _FIX = 3
-_FEWEST = 20
+_FEWEST, _STANDS = 20, 0.2
+"""A clock that stands still for so many records tells of no two heights when they were measured."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
     """Where estimate and barometer part while it matters."""
-    estimate, heard = flight.estimated_height, flight.barometer
-    if not flight.is_copter or estimate is None or heard is None or not flight.armed or not _is_by_barometer(flight):
+    heard = flight.barometer
+    if not flight.is_copter or heard is None or not flight.armed or not _is_by_barometer(flight):
         return
+    for estimate in (flight.estimated_height, flight.controlled_height):
+        found = None if estimate is None else _parted(flight, estimate, heard)
+        if found is not None:
+            yield found
+            return
+
+
+def _parted(flight: Flight, estimate: tuple[Floats, Floats], heard: tuple[Floats, Floats]) -> Finding | None:
+    """Where a height and the barometer's part while it matters."""
     t, height = estimate
+    if any(np.mean(np.diff(one) <= 0.0) > _STANDS for one in (t, heard[0])):
+        return None
     apart = height - np.interp(t, *heard)
     watched = flight.watch(t)
     if watched.sum() < _FEWEST or not np.any(apart):
-        return
+        return None
     apart = smooth(t, apart - float(median(apart[watched][:_FEWEST])), 3.0)
     spans = lasting(t, (np.abs(apart) > _APART_M) & watched, _LASTS_S)
-    if not spans or _receiver_agrees(flight, spans):
-        return
+    if not spans or _receiver_agrees(flight, estimate, heard, spans):
+        return None
     start, end = spans[0][0], spans[-1][1]
     most = quantile(np.abs(apart[during(spans, t)]), 0.9)
-    yield Finding(
+    return Finding(
         kind="estimator",
         title="the estimated height runs away from the barometer's",
         onset_s=start,
@@ -69,11 +81,13 @@ def _is_by_barometer(flight: Flight) -> bool:
     return all(flight.setting(name) in (None, value) for name, value in _SOURCES)
 
 
-def _receiver_agrees(flight: Flight, spans: list[Span]) -> bool:
+def _receiver_agrees(
+    flight: Flight, estimate: tuple[Floats, Floats], heard: tuple[Floats, Floats], spans: list[Span]
+) -> bool:
     """Whether the receiver's height is nearer to the estimate than to the barometer meanwhile: then that drifts."""
-    received, estimate, heard = flight.one("GPS", "Alt", "Status"), flight.estimated_height, flight.barometer
+    received = flight.one("GPS", "Alt", "Status")
     fixed = None if received is None else received.where((received["Status"] >= _FIX) & flight.watch(received.t))
-    if fixed is None or estimate is None or heard is None or not len(fixed):
+    if fixed is None or not len(fixed):
         return False
     told = during(spans, fixed.t)
     climbed = fixed["Alt"] - float(median(fixed["Alt"][:_FEWEST]))

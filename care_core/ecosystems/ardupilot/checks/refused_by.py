@@ -35,6 +35,7 @@ _REPEATED_S = LIMITS.add(
 )
 _ONE_ROUND_S = LIMITS.add("time in which one attempt tells its refusals", 1.0, "s", "a choice: texts wait for a link")
 _PASSED = LIMITS.add("attempts without a refusal that had passed", 3.0, "", "a choice: texts can be lost")
+MOST = LIMITS.add("parameters off their default that are put back", 3.0, "", "a choice: more are how it is wired")
 _FAR = LIMITS.add(
     "far off its default", 1.5, "times", "a choice: what is tuned is seldom off by more and fails a check"
 )
@@ -100,7 +101,11 @@ def refusing(flight: Flight) -> tuple[Refusing, ...]:
     complaints = dict.fromkeys(one.why for one in last)
     found = [one for why in complaints for one in _behind(flight, why, last[-1].time_s)]
     shown = [one for one in found if one.is_shown]
-    return tuple({one.name: one for one in shown or found}.values())
+    told = tuple({one.name: one for one in shown or found}.values())
+    if len(told) <= MOST or shown:
+        return told
+    # Of many that are off each is as likely right: a vehicle that is wired so has them so.
+    return tuple(one._replace(wanted=None, words=one.words.partition(":")[0]) for one in told)
 
 
 def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
@@ -116,7 +121,9 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
     named = [one for one in held if one.name in reads.named]
     if proven := _at_fault(list(bound.values())):
         sure = PLAUSIBLE if is_outside else PROVEN
-        yield from (_told(one, sure, _asks(one, broken, values), is_shown=True) for one in proven)
+        for one in proven:
+            only = next((value for must in broken if (value := must.value_of(one.name)) is not None), None)
+            yield _told(one, sure, _asks(one, broken, values), is_shown=True, only=only)
     elif proven := _at_fault(named):
         yield from (_told(one, PROVEN, is_shown=True) for one in proven)
     else:
@@ -164,11 +171,16 @@ def _held(flight: Flight, name: str, value: float) -> _Held:
     return _Held(name, value, known, None if meaning is None else meaning.role)
 
 
-def _told(one: _Held, probability: float, asks: str = "", *, is_shown: bool = False) -> Refusing:
+def _told(
+    one: _Held, probability: float, asks: str = "", *, is_shown: bool = False, only: float | None = None
+) -> Refusing:
+    """`only`: the one value that its check takes."""
     default = "" if one.default is None else f" (default {one.default:g})"
     told = f"{one.name} is {one.value:g}{default}{f', {asks}' if asks else ''}"
     wanted = one.default if one.is_off and one.role in ("choice", "wiring") else None
-    if wanted is not None:
+    if only is not None:
+        wanted, back = only, f"'param set {one.name} {only:g}' sets it"
+    elif wanted is not None:
         back = f"'param set {one.name} {wanted:g}' puts it back"
     else:
         back = "calibrate again" if one.role in ("calibration", "written") else "check it first"

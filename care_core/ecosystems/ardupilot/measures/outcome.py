@@ -129,10 +129,12 @@ def _moved(mission: Mission) -> Value:
 
 def _took_off(mission: Mission, *, crashed: bool) -> Value:
     heights = _heights(mission)
-    flew = (len(heights) and bool(heights.max() > AIRBORNE_M)) or _detected(mission, _TOOK_OFF)
+    flight = flight_of(mission)
+    lifted = not flight.is_copter or flight.throttle is None or bool(flight.airborne)  # no height without thrust
+    flew = lifted and ((len(heights) and bool(heights.max() > AIRBORNE_M)) or _detected(mission, _TOOK_OFF))
     if flew or crashed:
         return float(flew)
-    if len(heights) and heights.max() > _BARELY_M:
+    if lifted and len(heights) and heights.max() > _BARELY_M:
         return Unavailable(f"it rose no higher than {heights.max():.1f} m: too little to tell a flight by")
     return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
 

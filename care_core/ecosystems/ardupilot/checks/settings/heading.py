@@ -43,6 +43,9 @@ _OFF_DEG = LIMITS.add("heading off the true one", 15.0, "deg", "twice what healt
 _RIGHT_DEG = LIMITS.add("heading that is right", 20.0, "deg", "a choice: mountings are 45 degrees apart")
 _TURNED_DEG = LIMITS.add("heading of a compass that is turned", 30.0, "deg", "a choice: mountings are 45 degrees apart")
 _BETTER = LIMITS.add("share that another mounting explains more", 0.15, "", "a choice")
+_UNTOUCHED_S = LIMITS.add(
+    "shortest flight that tells against a mounting that nobody changed", 60.0, "s", "a choice: few leans are chance"
+)
 _SURE = LIMITS.add("probability that undoing it mends", 0.95, "", "no other parameter brings the compass back")
 _NEAR = LIMITS.add("measured value that is the default", 0.05, "", "a choice: a share of the field")
 _FEWEST, _ROUNDED = 3, 0.01
@@ -217,6 +220,8 @@ def _turned(one: _Compass, driven: Course, course: Callable[[Floats], Course]) -
     if not name.startswith("COMPASS_") or (driven.explained > _EXPLAINED and abs(driven.off_deg) < _TURNED_DEG):
         return None
     default = one.flight.default_left(name)
+    if default is None and sum(end - start for start, end in one.flight.flown) < _UNTOUCHED_S:
+        return None
     mountings = [*([] if default is None else [default]), *(float(n) for n in range(_FLAT) if n != number)]
     for mounting in mountings:
         field = one.mounted(mounting)
