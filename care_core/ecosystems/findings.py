@@ -135,6 +135,15 @@ UNCHARGED = "the battery was not charged"
 CAME_DOWN = "it came down and could not rise again"
 
 
+class OfRun(Record):
+    """What happened in one run of a log that holds several, and what was found in it."""
+
+    end_s: float
+    """When its part of the log ends."""
+    findings: tuple[Finding, ...]
+    timeline: tuple[Event, ...]
+
+
 class Health(Record):
     """What happened in a log. `findings` stand in the order told, the first cause first."""
 
@@ -144,13 +153,13 @@ class Health(Record):
     findings: tuple[Finding, ...]
     too_little: str = ""
     """Why the log holds too little to say how a run went: it is too short, or no run is in it."""
-    runs: tuple[tuple[float, tuple[Finding, ...]], ...] = ()
-    """Of a log that holds several runs, when each one's part of it ends, and what was found in that part."""
+    runs: tuple[OfRun, ...] = ()
+    """Of a log that holds several runs, each of them."""
 
     def of_run(self, start_s: float) -> Health:
-        """The same with the findings of one run alone, that of a log which was begun at this time."""
-        own = next((findings for end_s, findings in self.runs if start_s <= end_s), self.findings)
-        return replace(self, findings=own)
+        """The same of one run alone, that of a log which was begun at this time."""
+        own = next((run for run in self.runs if start_s <= run.end_s), None)
+        return self if own is None else replace(self, findings=own.findings, timeline=own.timeline)
 
 
 NOTHING_SEEN = Health("", (), ())

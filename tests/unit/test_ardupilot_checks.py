@@ -473,7 +473,8 @@ def test_too_little_thrust_and_an_option_that_keeps_it_down() -> None:
     made = Made()
     high = made.after(30.0, DOWN_S)
     made.table["CTUN"]["ThO"][high] = 0.98
-    made.table["CTUN"]["Alt"][high] -= 6.0
+    for name, field in (("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt"), ("POS", "RelHomeAlt")):
+        made.table[name][field][high] -= 6.0
     finding = first(made)
     assert (finding.kind, finding.severity, finding.suspect) == ("thrust", "critical", "hardware")
     made.settings["MOT_SPIN_MAX"] = 0.6

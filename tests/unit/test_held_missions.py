@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.ardupilot.held_missions import held_missions
-from care_core.ecosystems.ardupilot.timeline import timeline
+from care_core.ecosystems.ardupilot.timeline import timelines
 from care_core.logs import formats
 from care_core.logs.base import Table
 from care_core.logs.telemetry import as_dataflash
@@ -51,7 +51,7 @@ FLOWN = upload(0.0, 100)
 
 
 def told(mission: Any) -> list[str]:
-    return [event.text for event in timeline(mission.model, ()) if event.source == "CMD"]
+    return [event.text for event in next(timelines(mission.model, ())) if event.source == "CMD"]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.ardupilot.checks import battery as battery_check
-from care_core.ecosystems.ardupilot.timeline import timeline
+from care_core.ecosystems.ardupilot.timeline import timelines
 from care_core.ecosystems.findings import Event
 from care_core.ecosystems.timeline import MOST
 from care_core.logs.base import Table
@@ -47,7 +47,7 @@ def told(
     settings: Mapping[str, tuple[Setting, ...]] | None = None, damage: Sequence[Damage] = (),
 ) -> list[Event]:  # fmt: skip
     known = {name: (Setting(name, value, "PARM"),) for name, value in QUAD_X.items()} | dict(settings or {})
-    return list(timeline(flight_of(tables, known, facts, end_s, damage), tables.values()))
+    return list(next(timelines(flight_of(tables, known, facts, end_s, damage), tables.values())))
 
 
 def texts(events: Sequence[Event], kind: str = "") -> list[str]:
@@ -216,7 +216,7 @@ def test_a_report_names_one_count_of_cells() -> None:
     pack = rows(*((float(t), 12.5 - 0.001 * t) for t in range(100)), names=("Volt",))
     full = {"MOT_BAT_VOLT_MAX": (Setting("MOT_BAT_VOLT_MAX", 16.8, "PARM"),)}
     flight = flight_of({"BAT": pack, "ARM": ARMED}, full, COPTER)
-    assert "battery at 12.5 V (4 cells)" in texts(timeline(flight, []), "battery")
+    assert "battery at 12.5 V (4 cells)" in texts(next(timelines(flight, [])), "battery")
     assert any("each of 4 cells" in finding.evidence for finding in battery_check.find(flight))
 
 

@@ -316,10 +316,11 @@ class Airborne(Armed):
                 return
 
     def _fell_ms(self, at: float) -> float:
-        """How fast it came down in the second before."""
+        """How fast it came down in the second before, or in the last half of it."""
         if self.height is None:
             return 0.0
-        return float(np.interp(at - _BEFORE_HIT_S, *self.height) - np.interp(at, *self.height)) / _BEFORE_HIT_S
+        spans = (_BEFORE_HIT_S, _BEFORE_HIT_S / 2)
+        return max(float(np.interp(at - s, *self.height) - np.interp(at, *self.height)) / s for s in spans)
 
     def _flew_ms(self, at: float) -> float:
         """How fast it moved over ground in the seconds before."""

@@ -12,7 +12,7 @@ from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded
 from care_core.ecosystems.explains import EXPLAINS
-from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health
+from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health, OfRun
 from care_core.ecosystems.plausible import clock_doubt
 from care_core.ecosystems.ranking import GRAVITY, rank_findings
 from care_core.logs.base import Wanted, merge_needs
@@ -68,17 +68,19 @@ def _on_a_bench(findings: Iterable[Finding]) -> Iterator[Finding]:
 
 
 def examine(flight: Flight) -> Health:
-    """What happened in a DataFlash or telemetry log."""
+    """What happened in a DataFlash or telemetry log, and in each of its runs."""
     tables = flight.sound(READS)
     is_readable = flight.end_s >= _TOO_SHORT_S and any(name in tables for name in _TELLING)
-    found = [(run.end_s, find(run)) for run in flight.runs] if is_readable else []
-    findings = _told_once(one for _, of_run in found for one in of_run)
+    found = [find(run) for run in flight.runs] if is_readable else []
+    findings = _told_once(one for of_run in found for one in of_run)
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
     if not too_little and all(one.severity == "info" for one in findings):
         # Times that cannot be are no reason to keep quiet about what was found, but none to call the rest fine.
         too_little = clock_doubt(MESSAGES, tables, 0.0, flight.end_s)
-    told = timeline.timeline(flight, tables.values())
-    return Health(flight.vehicle.title, told, findings, too_little, tuple(found) if len(found) > 1 else ())
+    ends = [run.end_s for run in flight.runs]
+    whole, *parts = timeline.timelines(flight, tables.values(), ends)
+    runs = tuple(map(OfRun, ends, found, parts)) if len(found) > 1 else ()
+    return Health(flight.vehicle.title, whole, findings, too_little, runs)
 
 
 def _told_once(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -79,11 +79,12 @@ _FLICKERS_S = 1.0
 _IN_AIR_M, _LIFTED_M = 2.0, 0.5
 
 
-def timeline(flight: Flight, tables: Iterable[Table]) -> tuple[Event, ...]:
-    """What happened in a flight.
+def timelines(flight: Flight, tables: Iterable[Table], ends: Sequence[float] = ()) -> Iterator[tuple[Event, ...]]:
+    """What happened in a log, then what did in each of its runs.
 
     Args:
         tables: everything that is read of its log, to see where nothing is recorded.
+        ends: when the part of each run ends.
     """
     vehicle = flight.vehicle
     found = [
@@ -101,7 +102,11 @@ def timeline(flight: Flight, tables: Iterable[Table]) -> tuple[Event, ...]:
         *_clock(flight),
         *_end(flight),
     ]
-    return timeline_of(_once(found), _introduced(flight, vehicle))
+    told, introduced = list(_once(found)), _introduced(flight, vehicle)
+    yield timeline_of(told, introduced)
+    for start, end in pairwise((-math.inf, *ends)):
+        in_force = [one for one in told if one.kind == "mode" and one.time_s <= start][-1:]
+        yield timeline_of([*in_force, *(one for one in told if start < one.time_s <= end)], introduced)
 
 
 def _introduced(flight: Flight, vehicle: Vehicle) -> Event:
