@@ -171,8 +171,12 @@ def _pauses(drive: Drive) -> Iterator[Event]:
         yield Event(float(first[row]), "topic", words, names[0])
 
 
+_USUALLY = 1.3
+"""A window that takes so many times as long has nearly the usual rate."""
+
+
 def _slower(topic: str, times: Floats, usual: float) -> Iterator[Event]:
-    """Where the rate falls to less than half, for good or for a while."""
+    """Where the rate falls to less than half, for good or for a while, or rises from it."""
     window = max(int(SLOWER_S / usual), 10)
     if len(times) < 3 * window:
         return
@@ -180,9 +184,15 @@ def _slower(topic: str, times: Floats, usual: float) -> Iterator[Event]:
     slow = np.flatnonzero(took > SLOWER_S / SLOWER)
     slow = slow[took[slow] > window * usual / SLOWER]
     if len(slow):
-        at = float(times[slow[0]])
-        words = f"{topic} becomes slower: {window / took[slow].max():.3g} Hz instead of {1 / usual:.3g} Hz"
-        yield Event(at, "topic", words, topic)
+        rates = f"{window / took[slow].max():.3g} Hz", f"{1 / usual:.3g} Hz"
+        usually = np.flatnonzero(took < _USUALLY * window * usual)
+        if not np.any(usually < slow[0]):  # it was so from the start
+            at = float(times[usually[0]] if len(usually) else times[-1])
+            yield Event(at, "topic", f"{topic} becomes faster: {rates[1]} instead of {rates[0]}", topic)
+        else:
+            yield Event(
+                float(times[slow[0]]), "topic", f"{topic} becomes slower: {rates[0]} instead of {rates[1]}", topic
+            )
 
 
 def _lifecycle(drive: Drive) -> Iterator[Event]:
