@@ -241,7 +241,7 @@ class MavlinkLog:
         times = self._times(data, packets.start)
         before = np.searchsorted(packets.start, [low for low, _ in sorted(damage)]) - 1
         return framed.where(is_unknown), [
-            Damage(text, low, float(times[at]) if at >= 0 else None)
+            Damage(text, low, float(times[at]) if at >= 0 and 0.0 <= times[at] <= self._clock.duration_s else None)
             for (low, text), at in zip(sorted(damage), before.tolist(), strict=True)
         ]
 

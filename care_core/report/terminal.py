@@ -66,7 +66,8 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
         at = "" if damage.time_s is None else f" at {log_time(damage.time_s)}"
         yield from wrapped(f"{damage.what}{at}", "Damage   ")
     if len(run.log.damage) > DAMAGE_SHOWN:
-        yield f"Damage   and {len(run.log.damage) - DAMAGE_SHOWN} more places, 'care inspect' lists them"
+        rest = len(run.log.damage) - DAMAGE_SHOWN
+        yield f"Damage   and {rest} more {'places' if rest > 1 else 'place'}, 'care inspect' lists them"
 
 
 def _missions(diagnosis: Diagnosis) -> Iterator[str]:
