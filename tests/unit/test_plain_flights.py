@@ -236,3 +236,12 @@ def test_what_a_mission_unlike_all_of_the_training_may_need_is_not_known(length_
     model = cast("Model", SimpleNamespace(summaries={"path_length": SimpleNamespace(low=201.0, high=810.0)}))
     run = replace(made_run(), context={"path_length": length_m})
     assert bool(beyond_training(run, read_schema(PROFILE), model)) == is_unlike
+
+
+@pytest.mark.parametrize(("throttle", "has_flown"), [(0.4, True), (0.0, False)])
+def test_a_height_without_thrust_is_no_flight(throttle: float, *, has_flown: bool) -> None:
+    at = np.arange(0.0, 75.0, 0.5)
+    height = np.interp(at, [10, 20, 60, 70], [0, 30, 30, 0])
+    driven = np.where((at > 10.5) & (at < 69.5), throttle, 0.0)
+    controls = replace(flight()["POS"], times=at, columns={"ThO": driven, "Alt": height})
+    assert is_known(checks(flown(mode=0, CTUN=controls))["took_off"]) is has_flown

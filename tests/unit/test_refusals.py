@@ -285,3 +285,9 @@ def test_what_real_vehicles_were_refused_for_in_passing_names_nothing_that_is_ca
     finding = refused(text, **calibrated)
     assert finding.parameters == ()
     assert finding.suspect in ("operation", "world", "parameter")
+
+
+def test_a_check_that_takes_one_value_asks_for_it() -> None:
+    assert Must("SERVO1_FUNCTION", "=", "33").value_of("SERVO1_FUNCTION") == 33.0
+    assert Must("SERVO1_FUNCTION", "!=", "0").value_of("SERVO1_FUNCTION") is None
+    assert Must("MOT_PWM_MAX", "=", "MOT_PWM_MIN").value_of("MOT_PWM_MAX") is None

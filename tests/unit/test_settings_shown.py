@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
+from care_core.ecosystems.ardupilot.checks.settings import heading
 from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.measures import Mission, find_extractor
@@ -540,3 +544,27 @@ def test_a_hover_throttle_that_nothing_learns() -> None:
     made.settings["MOT_HOVER_LEARN"] = 0
     ((name, value),) = naming(made, "MOT_THST_HOVER").wanted
     assert (name, value) == ("MOT_THST_HOVER", HOVER)
+
+
+@pytest.mark.parametrize(("flown_s", "is_blamed"), [(20.0, False), (90.0, True)])
+def test_a_mounting_that_nobody_changed_is_blamed_by_a_long_flight_alone(flown_s: float, *, is_blamed: bool) -> None:
+    class Flown:
+        flown = ((0.0, flown_s),)
+
+        def default_left(self, _name: str) -> None:
+            return None
+
+        def setting(self, _name: str) -> float:
+            return 0.0
+
+    class Compass:
+        flight, number, mounting, field = Flown(), 1, "COMPASS_ORIENT", np.zeros((3, 1))
+
+        def mounted(self, number: float) -> Any:
+            return np.full((3, 1), number)
+
+    def course(field: Any) -> Any:
+        return SimpleNamespace(explained=0.95 if field[0, 0] == 2.0 else 0.1, off_deg=0.0)
+
+    found = heading._turned(cast("Any", Compass()), course(np.zeros((3, 1))), course)
+    assert (found is not None) is is_blamed

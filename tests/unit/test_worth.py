@@ -185,6 +185,15 @@ def test_a_change_of_what_does_not_stand_above_chance_is_not_advised() -> None:
     assert no_stand_out(fix_with(0.9), 0.2, unnamed, 0.9) is not None
 
 
+def test_a_cause_that_is_less_likely_than_what_the_profile_does_not_know_is_not_changed() -> None:
+    others = (
+        Hypothesis("parameter", "", 0.4),
+        Hypothesis("parameter", LAND_SPEED.name, 0.35),
+        Hypothesis("chance", "", 0.25),
+    )
+    assert no_stand_out(fix_with(0.9), 0.2, others, necessary=0.9) is not None
+
+
 def test_another_parameter_than_the_likeliest_cause_is_changed_only_where_it_was_necessary_and_says_why() -> None:
     others = (
         Hypothesis("parameter", "other", 0.5),

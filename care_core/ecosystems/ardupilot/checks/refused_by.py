@@ -177,8 +177,9 @@ def _told(
     """`only`: the one value that its check takes."""
     default = "" if one.default is None else f" (default {one.default:g})"
     told = f"{one.name} is {one.value:g}{default}{f', {asks}' if asks else ''}"
-    wanted = one.default if one.is_off and one.role in ("choice", "wiring") else None
-    if only is not None:
+    is_set_by_hand = one.role in ("choice", "wiring")
+    wanted = one.default if one.is_off and is_set_by_hand else None
+    if only is not None and is_set_by_hand:
         wanted, back = only, f"'param set {one.name} {only:g}' sets it"
     elif wanted is not None:
         back = f"'param set {one.name} {wanted:g}' puts it back"
