@@ -18,6 +18,7 @@ from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_pro
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import quantile
 
@@ -100,7 +101,8 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     off, dt = _unexplained(fixed)
     limit = JUMP_M + 0.25 * ACCELERATION * np.minimum(dt, 1.5) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
     limit = np.maximum(limit, _TIMES_USUAL * quantile(off, 0.9))  # a velocity that never fits tells nothing
-    beyond = np.flatnonzero((off > limit) & (dt < _STEP_S) & (dt > 0.01))
+    late = t[1:] < t[0] + _STEP_S if flight.is_telemetry else np.zeros(len(off), dtype=bool)  # what waited for the link
+    beyond = np.flatnonzero((off > limit) & (dt < _STEP_S) & (dt > 0.01) & ~late)
     if not len(beyond):
         return
     start, size = float(t[1:][beyond[0]]), float(off[beyond].max())
@@ -174,7 +176,7 @@ def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
         severity: Severity = "critical" if total > _LONG_S and not flight.all("GPS")[1:] else "warning"
         yield Finding(
             kind="gps",
-            title="the GPS fix was lost in the air",
+            title=f"the GPS fix was lost {'in the air' if flies(flight.kind) else 'on the way'}",
             onset_s=start,
             end_s=out[-1][1],
             severity=severity,
