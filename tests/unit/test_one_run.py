@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from care_core.diagnose.judging import judge_plainly
-from care_core.ecosystems.ardupilot.examining import examine
+from care_core.ecosystems.ardupilot.examining import examine, find
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.findings import every_finding
 from care_core.logs.base import Table
@@ -90,9 +90,10 @@ def test_the_mode_in_force_before_a_run_holds_in_it() -> None:
 
 
 def test_a_log_of_one_run_is_itself() -> None:
-    flight = Made().flight()
+    flight = overturned(Made()).flight()
     assert flight.runs == (flight,)
     assert examine(flight).runs == ()
+    assert examine(flight).findings == find(flight), "in the order of its causes"
 
 
 @pytest.mark.parametrize(("throttle", "lies"), [(0.4, True), (0.0, False)])

@@ -72,7 +72,7 @@ def examine(flight: Flight) -> Health:
     tables = flight.sound(READS)
     is_readable = flight.end_s >= _TOO_SHORT_S and any(name in tables for name in _TELLING)
     found = [find(run) for run in flight.runs] if is_readable else []
-    findings = _told_once(one for of_run in found for one in of_run)
+    findings = found[0] if len(found) == 1 else _told_once(one for of_run in found for one in of_run)
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
     if not too_little and all(one.severity == "info" for one in findings):
         # Times that cannot be are no reason to keep quiet about what was found, but none to call the rest fine.
@@ -84,8 +84,8 @@ def examine(flight: Flight) -> Health:
 
 
 def _told_once(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings of all runs, the severest first; a note that each run brings stands once."""
+    """The findings of several runs, after an impact last, else the severest first; a note that each run brings once."""
     told: dict[tuple[str, float | None], Finding] = {}
     for one in findings:
         told.setdefault((one.title, None if one.severity == "info" else one.onset_s), one)
-    return tuple(sorted(told.values(), key=lambda one: GRAVITY[one.severity]))
+    return tuple(sorted(told.values(), key=lambda one: (one.after_impact, GRAVITY[one.severity])))
