@@ -62,7 +62,8 @@ def quantile(values: ArrayLike, share: float) -> float:
 
 def ascending(values: Floats) -> Floats:
     """The values in order; themselves where they are, as times nearly always."""
-    return values if np.all(values[:-1] <= values[1:]) else np.sort(values)
+    # A stable sort merges what is several series one behind another, which is what else they are.
+    return values if np.all(values[:-1] <= values[1:]) else np.sort(values, kind="stable")
 
 
 def pauses(series: Iterable[Floats], longer_than: float) -> tuple[Floats, Floats]:

@@ -19,9 +19,8 @@ from care_core.diagnose.fixes import (
     to_fix,
 )
 from care_core.diagnose.judging import Judged
-from care_core.diagnose.next_step import was_refused
 from care_core.diagnose.outside.change import Advisable, check_first, outside_fix
-from care_core.diagnose.parts import mend_first, set_wrong
+from care_core.diagnose.parts import mend_first, set_wrong, was_refused
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Fault, Fix, Hypothesis

@@ -36,7 +36,7 @@ from care_core.diagnose.estimates import (
     UNTOLD,
 )
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, Key, NoisyOr, What
-from care_core.diagnose.parts import is_late, set_wrong
+from care_core.diagnose.parts import is_late, set_wrong, was_refused
 from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
@@ -91,7 +91,7 @@ def failure_of(
     before = query.before()
     names = [result.variable.name for result in broken]
     options, chance = _lost_by_options(before, names)
-    if any(one.kind == "prearm" and one.severity == "critical" for one in findings):
+    if was_refused(findings):
         options = dict.fromkeys(options, 0.0)  # what acts in flight kept no vehicle from arming
     else:
         unlearned = float(before.epistemic_ratio([before.config], names)[0])

@@ -28,11 +28,6 @@ def was_upset(run: Run, findings: Iterable[Finding]) -> bool:
     )
 
 
-def was_refused(findings: Iterable[Finding]) -> bool:
-    """Whether it never armed."""
-    return any(one.kind == "prearm" and one.severity == "critical" for one in every_finding(findings))
-
-
 def trial(run: Run) -> str:
     """Where what was upset is tried before it runs its mission again."""
     is_robot, kind = format_named(run.log.format).ecosystem == "ros", vehicle_of(run.log.facts, {}).kind

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding
+from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding, every_finding
 from care_core.ecosystems.ranking import LIKELY
 from care_core.text import log_time
 
@@ -20,6 +20,11 @@ vehicle was set have that part failing."""
 _VOLTAGE = re.compile(r"batter|voltage", re.IGNORECASE)
 _SET_APART = re.compile(r"critical\s*>=|failsafe critical|capacity", re.IGNORECASE)
 """A refusal for how two failsafes were set, whatever the voltage."""
+
+
+def was_refused(findings: Iterable[Finding]) -> bool:
+    """Whether it never armed, by what was found or by what that led to."""
+    return any(one.kind == "prearm" for one in every_finding(findings))
 
 
 def set_wrong(finding: Finding) -> bool:

@@ -155,6 +155,8 @@ class Health(Record):
     """Why the log holds too little to say how a run went: it is too short, or no run is in it."""
     runs: tuple[OfRun, ...] = ()
     """Of a log that holds several runs, each of them."""
+    shown_right: frozenset[str] = frozenset()
+    """Parameters that this log shows to be right, however far from a default."""
 
     def of_run(self, start_s: float) -> Health:
         """The same of one run alone, that of a log which was begun at this time."""

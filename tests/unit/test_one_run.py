@@ -99,8 +99,8 @@ def test_a_log_of_one_run_is_itself() -> None:
 @pytest.mark.parametrize(("throttle", "lies"), [(0.4, True), (0.0, False)])
 def test_a_copter_on_its_back_has_crashed_where_its_motors_had_just_worked(throttle: float, lies: bool) -> None:
     made = Made()
-    over = made.t >= DOWN_S + 2.0
+    over = made.t >= DOWN_S + 4.0
     made.table["ATT"]["Roll"][over] = 178.0
-    made.table["CTUN"]["ThO"][(made.t > DOWN_S) & (made.t < DOWN_S + 2.5)] = throttle
+    made.table["CTUN"]["ThO"][(made.t > DOWN_S) & (made.t < DOWN_S + 4.5)] = throttle
     made.rows["ARM"] = made.rows["ARM"][:1]
     assert (made.flight().lost_control_s is not None) is lies

@@ -40,7 +40,7 @@ def suspects_outside(
         return ()
     vehicle = vehicle_of_run(run)
     modelled = {name for option in schema.options for name in readable(option)} if schema is not None else set()
-    off = list(off_parameters(run.settings, vehicle, modelled, good))
+    off = [one for one in off_parameters(run.settings, vehicle, modelled, good) if one.name not in health.shown_right]
     if not off:
         return ()
     begins = "armed" if vehicle.kind == "rover" else "took off"

@@ -27,6 +27,7 @@ READS: Wanted = {
     "CTUN": ("ThO", "Alt", "BAlt", "DAlt"),
     "ATT": ("Roll", "Pitch", "DesRoll", "DesPitch"),
     "IMU": ("AccX", "AccY", "AccZ"),
+    "RATE": ("R", "P"),
 }
 
 UPSIDE_DOWN_DEG = 100.0
@@ -65,8 +66,11 @@ _HIT_LOST_S = 10.0
 _FAST_MS, _STILL = 5.0, 2.0
 """A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
 _SIMULATED_HIT = re.compile(r"SIM Hit ground at (\d+(?:\.\d+)?) m/s")
-_BEFORE_OVER_S = 2.0
-"""Motors that worked so shortly before a copter lay on its back turned it over, or let it fall."""
+_BEFORE_OVER_S, _ON_SIDE_DEG = 3.0, 50.0
+"""Motors that worked so shortly before a copter lay on its back or its side turned it over, or let it fall; no ground
+that a copter stands on is so steep."""
+_SPINS_DEG_S, _HALF_TURN_DEG = 400.0, 180.0
+"""A copter that turns so fast about its level axes, and so far, in a mode that keeps it level has turned over."""
 _TAXIES_MS = 8.0
 """Faster over ground, a plane flies or is about to; against a gale its height tells."""
 _TUMBLING_DEG, _TUMBLES_S = 45.0, 2.0
@@ -206,7 +210,7 @@ class Airborne(Armed):
             flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
-        return self._overturned_s
+        return min((t for t in (self._overturned_s, self._spun_s) if t is not None), default=None)
 
     @property
     def _lifting_off(self) -> Iterator[Span]:
@@ -222,18 +226,32 @@ class Airborne(Armed):
 
     @property
     def _overturned_s(self) -> float | None:
-        """When a copter whose motors had just worked turned over, and lay on its back to the end; None where it did
-        not: whatever its height says, that is no landing."""
+        """When a copter whose motors had just worked turned over, and lay on its back or its side to the end; None
+        where it did not: whatever its height says, that is no landing."""
         assert self.tilt is not None
         t, tilt = self.tilt
         if not self.armed:
             return None
-        over = runs(t, (tilt > UPSIDE_DOWN_DEG) & (t >= self.armed[0][0]), gap_s=_STRUCK_S)
+        over = runs(t, (tilt > _ON_SIDE_DEG) & (t >= self.armed[0][0]), gap_s=_STRUCK_S)
         if not over or over[-1][1] < t[-1] - _STRUCK_S or over[-1][1] - over[-1][0] < _STRUCK_S:
             return None
         start = over[-1][0]
         before = t[(t > start - _BEFORE_OVER_S) & (t <= start)]
         return start if self._is_driven(before).any() else None
+
+    @property
+    def _spun_s(self) -> float | None:
+        """When a copter whose motors worked turned over faster than its attitude, ten times a second, can tell."""
+        table = self.one("RATE", "R", "P")
+        if table is None or not self.armed:
+            return None
+        t, rate = table.t, np.maximum(np.abs(table["R"]), np.abs(table["P"]))
+        for start, end in runs(t, (rate > _SPINS_DEG_S) & during(self.armed, t)):
+            at, turns = t[(t >= start) & (t <= end)], rate[(t >= start) & (t <= end)]
+            turned = float(np.sum(np.diff(at) * (turns[1:] + turns[:-1]) / 2))
+            if turned > _HALF_TURN_DEG and self._is_driven(at[:1]).any():
+                return start
+        return None
 
     def _reaches_after(self, time_s: float) -> bool:
         """Whether it reached another waypoint after a time, before it was disarmed: that is steered."""

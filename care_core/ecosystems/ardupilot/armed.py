@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.instances import FIX
 from care_core.ecosystems.ardupilot.recorded import Recorded
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, runs
 from care_core.ecosystems.vehicles import method_words, unrecorded_changes
@@ -31,7 +32,7 @@ _OPENED_S, _CLOSED_S = 0.5, 2.0
 _FEWEST, _TIMES = 10, 10.0
 """A pause is a closed logger where it is so many times what usually lies between two records."""
 _NEAR_HOME_M = 50.0
-_ALIVE_M, _ON_GROUND_M, _APART_M, _FIX = 0.05, 1.2, 3.0, 3
+_ALIVE_M, _ON_GROUND_M, _APART_M = 0.05, 1.2, 3.0
 """A barometer that moves by more lives, and by less than the second on the ground, propellers and all."""
 _MOVES_MS, _AROUND_S = 3.0, 10.0
 """Faster, it taxies or flies; so long before and after belongs to it."""
@@ -139,7 +140,7 @@ class Armed(Recorded):
     def _moving(self) -> tuple[Span, ...]:
         """From a little before it first moves to a little after it last does; none where no receiver tells."""
         moved = self.one("GPS", "Spd", "Status")
-        t = np.empty(0) if moved is None else moved.t[(moved["Spd"] > _MOVES_MS) & (moved["Status"] >= _FIX)]
+        t = np.empty(0) if moved is None else moved.t[(moved["Spd"] > _MOVES_MS) & (moved["Status"] >= FIX)]
         span = () if not len(t) else ((max(0.0, float(t[0]) - _AROUND_S), min(self.end_s, float(t[-1]) + _AROUND_S)),)
         return span if span and span[0][1] - span[0][0] > 2 * _AROUND_S else ()
 
@@ -221,7 +222,7 @@ class Armed(Recorded):
             return False
         apart = float(np.max(np.abs(np.interp(t, *estimate) - baro)))
         received = self.one("GPS", "Alt", "Status")
-        fixed = np.empty(0) if received is None else received["Alt"][received["Status"] >= _FIX]
+        fixed = np.empty(0) if received is None else received["Alt"][received["Status"] >= FIX]
         return apart > _APART_M and (len(fixed) == 0 or float(np.ptp(fixed)) < _APART_M)
 
 

@@ -80,7 +80,7 @@ def examine(flight: Flight) -> Health:
     ends = [run.end_s for run in flight.runs]
     whole, *parts = timeline.timelines(flight, tables.values(), ends)
     runs = tuple(map(OfRun, ends, found, parts)) if len(found) > 1 else ()
-    return Health(flight.vehicle.title, whole, findings, too_little, runs)
+    return Health(flight.vehicle.title, whole, findings, too_little, runs, flight.shown_right)
 
 
 def _told_once(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot import airborne, armed, recorded, sources
 from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M, FOLLOWED_DEG, Airborne
 from care_core.ecosystems.ardupilot.battery import Battery
+from care_core.ecosystems.ardupilot.instances import FIX
 from care_core.ecosystems.ardupilot.one_run import OneRun, windows_of
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, runs
 from care_core.ecosystems.base import RunModel
@@ -90,6 +91,13 @@ class Flight(Airborne):
             t for t, text in complaints if any(word in text for word in words) and (but is None or but not in text)
         ]
         return named[0] if named and named[-1] > complaints[-1][0] - _REFUSED_S else None
+
+    @cached_property
+    def shown_right(self) -> frozenset[str]:
+        """Parameters that this log shows to be right: the type of a receiver that has a fix."""
+        fixed = [one for one in self.all("GPS", "Status") if np.any(one["Status"] >= FIX)]
+        numbers = [int(one["I"][0]) + 1 if "I" in one.columns else 1 for one in fixed]
+        return frozenset(name for n in numbers for name in (f"GPS{n}_TYPE", "GPS_TYPE" if n == 1 else f"GPS_TYPE{n}"))
 
     @cached_property
     def watched(self) -> tuple[Span, ...]:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from care_core.ecosystems.ardupilot.armed import Armed
-from care_core.ecosystems.ardupilot.instances import instances, sees_nothing
+from care_core.ecosystems.ardupilot.instances import FIX, instances, sees_nothing
 from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.base import Limits
@@ -68,7 +68,6 @@ SOURCES = (
     Live("RCOU", tuple(f"C{n}" for n in range(1, 15)), "the record of the motor outputs", "motor", _s("outputs", 10.0),
          _ANY, is_optional=True, mission_lost=ASIDE),
 )  # fmt: skip
-_FIX = 3
 _SAME_THROTTLE = 0.03
 _METRES = 111_319.5
 _ZEROS: Mapping[str, tuple[FindingKind, str, tuple[str, ...]]] = {
@@ -179,7 +178,7 @@ def _named(message: str, number: int) -> str:
 def _fixed(table: Table) -> Table:
     """Where a receiver has a position: without a fix it repeats the last one, or says 0."""
     fixed = np.abs(table["Lat"]) + np.abs(table["Lng"]) > 1e-6
-    return table.where(fixed & (table["Status"] >= _FIX) if "Status" in table.columns else fixed)
+    return table.where(fixed & (table["Status"] >= FIX) if "Status" in table.columns else fixed)
 
 
 def motion_of(flight: Armed, span: Span, but: str) -> Motion:

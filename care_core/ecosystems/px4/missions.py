@@ -188,5 +188,6 @@ def _on_ground(flight: Px4Flight, span: Span, *, ended: bool) -> Value:
     aloft_m, before = flight.height_m(span[1]), flight.during(LANDED, "landed", (-math.inf, span[1]))
     was_aloft = before is not None and len(before) > 0 and before["landed"][-1] == 0
     if was_aloft and aloft_m is not None and aloft_m > AIRBORNE_M:
-        return 0.0  # disarming itself says that it landed
+        # Disarming itself says that it landed, and a height drifts: what falls feels it.
+        return float(upset.falls_after(flight, flight.killed_s(span) or span[1]) is False)
     return float(flight.last(LANDED, "landed", span[1]) == 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,9 +13,9 @@ from care_core.ecosystems.px4 import attitude
 from care_core.ecosystems.px4.flight import LANDED, POSITION, ROTARY, STATUS, Px4Flight
 from care_core.logs.base import Wanted, merge_needs
 
-_COMBINED = "sensor_combined"
-_FORCES = tuple(f"accelerometer_m_s2[{n}]" for n in range(3))
-READS: Wanted = merge_needs((attitude.READS, {_COMBINED: _FORCES, POSITION: ("z", "vz"), LANDED: ("landed",)}))
+COMBINED = "sensor_combined"
+FORCES = tuple(f"accelerometer_m_s2[{n}]" for n in range(3))
+READS: Wanted = merge_needs((attitude.READS, {COMBINED: FORCES, POSITION: ("z", "vz"), LANDED: ("landed",)}))
 
 LIMITS = Limits()
 LEFT_DEG = LIMITS.add("thrust direction off its demand", 30.0, "deg", "ArduCopter's crash check; PX4 has none")
@@ -23,6 +24,7 @@ _TIPPED_DEG = LIMITS.add(
 )
 _HELD_DEG = LIMITS.add("thrust direction that is held", 15.0, "deg", "a choice: half of the first")
 _BACK_S = LIMITS.add("time held after which it was back", 2.0, "s", "a choice: a gust")
+_CAUGHT_S = LIMITS.add("time held before the ground after which it was back", 1.0, "s", "a choice: a fall is short")
 _LASTS_S = LIMITS.add("shortest time off its demand", 0.2, "s", "a choice: a step of the demand is over sooner")
 _ALOFT_M = LIMITS.add("height in the air", 1.0, "m", "a choice: below, a landing leg may tip it")
 _HIT_MS = LIMITS.add("descent into the ground", 3.0, "m/s", "a fall from half a metre; MPC_LAND_SPEED is 0.7")
@@ -33,6 +35,9 @@ _USUAL_S = LIMITS.add("time before a blow", 4.0, "s", "a choice")
 _GROUND_M = LIMITS.add("height of the ground around where it was armed", 1.5, "m", "a choice: the barometer drifts")
 _LIES_M = LIMITS.add("movement of what lies on the ground", 0.5, "m", "a choice: the estimator still drifts")
 _LIES_S = LIMITS.add("time after a fall in which it lies", 2.0, "s", "a choice: what catches itself climbs again")
+_FALLING = LIMITS.add("what an accelerometer feels in a fall", 5.0, "m/s^2", "half of gravity; the air brakes the rest")
+_FALL_S = LIMITS.add("shortest fall", 0.15, "s", "half of that from half a metre; a bounce is over sooner")
+_CUT_S = LIMITS.add("time in which it falls without motors", 1.0, "s", "a choice: they stop at once")
 _ENDED_S = LIMITS.add("time in which it is on the ground or disarmed", 10.0, "s", "COM_DISARM_LAND: 2 s, and margin")
 _ACRO = 10
 """nav_state of acro, in which every attitude is meant (vehicle_status.msg)."""
@@ -86,10 +91,10 @@ def _dropped(flight: Px4Flight) -> Hit | None:
 
 def _struck(flight: Px4Flight) -> Hit | None:
     """The first blow at the end of a fast descent that ended the flight."""
-    table, position = flight.table(_COMBINED, *_FORCES), flight.table(POSITION, "z")
+    table, position = flight.table(COMBINED, *FORCES), flight.table(POSITION, "z")
     if table is None or position is None:
         return None
-    felt = np.sqrt(sum(table[name] ** 2 for name in _FORCES))
+    felt = np.sqrt(sum(table[name] ** 2 for name in FORCES))
     known = np.isfinite(position["z"])
     if not known.any():
         return None
@@ -116,6 +121,16 @@ def _ends_after(flight: Px4Flight, at: float) -> bool:
     )
 
 
+def falls_after(flight: Px4Flight, cut_s: float) -> bool | None:
+    """Whether it fell when its motors were cut, as its accelerometers feel; None where they are hardly recorded."""
+    table = flight.table(COMBINED, *FORCES)
+    soon = None if table is None else table.between(cut_s, cut_s + _CUT_S)
+    if soon is None or len(soon) < 3 * _CUT_S / _FALL_S:
+        return None
+    force = np.sqrt(sum(soon[name] ** 2 for name in FORCES))
+    return any(end - start >= _FALL_S for start, end in flight.spans(soon.t, force < _FALLING))
+
+
 def lost_control(flight: Px4Flight) -> Lost | None:
     """When a multicopter in the air stopped following its attitude demand and was not back before it was down."""
     lean = flight.lean
@@ -127,7 +142,8 @@ def lost_control(flight: Px4Flight) -> Lost | None:
     impact = hit(flight)
     for start, end in flight.spans(lean.t, off):
         falls = impact is not None and start <= impact.time_s <= end + _ENDED_S
-        if not is_aloft(flight, start) or not (falls or (end - start >= _LASTS_S and _stays(flight, lean, end))):
+        stays = _stays(flight, lean, end, impact.time_s if falls and impact is not None else math.inf)
+        if not is_aloft(flight, start) or not stays or not (falls or end - start >= _LASTS_S):
             continue
         now = (lean.t >= start) & (lean.t <= start + _LASTS_S)
         fall = lean.off[:, now].mean(axis=1)
@@ -151,8 +167,9 @@ def is_aloft(flight: Px4Flight, at: float) -> bool:
     )
 
 
-def _stays(flight: Px4Flight, lean: attitude.Lean, since: float) -> bool:
-    """Whether it was not back within limits, while armed, after a time."""
-    until = next((end for start, end in flight.armed if start <= since <= end), since)
+def _stays(flight: Px4Flight, lean: attitude.Lean, since: float, hit_s: float) -> bool:
+    """Whether it was not back within limits after a time, while armed and before it hit the ground."""
+    until = min(next((end for start, end in flight.armed if start <= since <= end), since), hit_s)
     held: NDArray[np.bool_] = (lean.error_deg < _HELD_DEG) & (lean.t > since) & (lean.t <= until)
-    return not any(end - start > _BACK_S for start, end in flight.spans(lean.t, held))
+    enough_s = _BACK_S if hit_s == math.inf else _CAUGHT_S
+    return not any(end - start > enough_s for start, end in flight.spans(lean.t, held))

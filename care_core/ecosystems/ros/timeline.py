@@ -186,13 +186,13 @@ def _slower(topic: str, times: Floats, usual: float) -> Iterator[Event]:
     if len(slow):
         rates = f"{window / took[slow].max():.3g} Hz", f"{1 / usual:.3g} Hz"
         usually = np.flatnonzero(took < _USUALLY * window * usual)
-        if not np.any(usually < slow[0]):  # it was so from the start
-            at = float(times[usually[0]] if len(usually) else times[-1])
-            yield Event(at, "topic", f"{topic} becomes faster: {rates[1]} instead of {rates[0]}", topic)
+        if not len(usually):
+            return
+        if usually[0] > slow[0]:  # it was slow from the start
+            at, how, (now, before) = usually[0], "faster", rates[::-1]
         else:
-            yield Event(
-                float(times[slow[0]]), "topic", f"{topic} becomes slower: {rates[0]} instead of {rates[1]}", topic
-            )
+            at, how, (now, before) = slow[0], "slower", rates
+        yield Event(float(times[at]), "topic", f"{topic} becomes {how}: {now} instead of {before}", topic)
 
 
 def _lifecycle(drive: Drive) -> Iterator[Event]:

@@ -11,9 +11,12 @@ from care_core.records import Record, field
 
 _FLIGHT_MODE, _EKF_PRIMARY, _FENCE = 10, 24, 9
 FAILSAFE = re.compile(
-    r"(?<!PrecLand: )failsafe(?!s? (measures|off|over|cleared|disabled)\b|\W+(short|long) event off)", re.IGNORECASE
+    r"(?<!PrecLand: )failsafe(?!s? (measures|off|over|cleared|disabled)\b|\W+(short|long) event off)"
+    r"|(critical|dangerous|emergency) battery\b(?!.*\b(advised|recommended)).*\b(landing|returning|return|RTL)\b",
+    re.IGNORECASE,
 )
-"""Texts that say that a failsafe acts, not that one is over or, in a landing on a target, what is done without it."""
+"""Texts that say that a failsafe acts, not that one is over or, in a landing on a target, what is done without it; of
+PX4 what it does where the battery is that low."""
 _FENCES = ((1, "upper altitude"), (2, "circle"), (4, "polygon"), (8, "lower altitude"))
 
 

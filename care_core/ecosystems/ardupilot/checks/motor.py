@@ -71,6 +71,7 @@ _FAR_LASTS_S = LIMITS.add("shortest critical excess", 2.0, "s", "a choice: a Qua
 _CHANGED = LIMITS.add("share of an excess that it had before", 1 / 3, "", "a choice: then it was even")
 _TURNS = LIMITS.add("share of the others' speed at which it stopped", 0.3, "", "a choice: idling is more")
 _TURNING_RPM = LIMITS.add("speed of motors that turn", 1000.0, "1/min", "a choice: idling is more")
+_ASKED = LIMITS.add("share of what the others are asked for at which it is to turn", 0.5, "", "a choice")
 _CALIBRATION = calibrated(
     LIMITS,
     ((1.0, 0.7), (2.0, 0.85)),
@@ -372,16 +373,19 @@ def _reported(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
 
 
 def _stopped(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
-    """A speed controller that reports no rotation while the others turn."""
+    """A speed controller that reports no rotation while the others turn, and its motor is told to."""
     speeds = flight.all("ESC", "RPM")
     if len(speeds) < 3:
         return
     t = speeds[0].t
     rpm = np.stack([np.interp(t, one.t, one["RPM"]) for one in speeds])
     usual = median(rpm, axis=0)
-    for n, row in enumerate(rpm):
-        spans = lasting(t, (row < _TURNS * usual) & (usual > _TURNING_RPM) & flight.watch(t), 0.5)
-        if spans and n < len(outputs.motors):
+    turning = (usual > _TURNING_RPM) & flight.watch(t)
+    asked = np.stack([np.interp(t, outputs.t, share) for share in outputs.share(slice(None))])
+    enough = _ASKED * median(asked, axis=0)
+    for n, (row, share) in enumerate(zip(rpm, asked, strict=False)):
+        is_asked = share > enough
+        if spans := lasting(t, (row < _TURNS * usual) & turning & is_asked, 0.5):
             yield _finding(outputs.motors[n], "stopped", spans[0][0], spans[-1][1], "critical",
                            f"its controller reports {median(row[t >= spans[0][0]]):.0f} turns a minute, the others "
                            f"{median(usual):.0f}", "ESC.RPM", _STOPPED)  # fmt: skip

@@ -112,7 +112,8 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
     reads = refusal_reads(why, flight.mode_kind, flight.settings)
     values = dict(_values(flight.settings, at_s))
     is_outside = "world" in reads.also
-    held = [_held(flight, name, values[name]) for name in reads.parameters if name in values]
+    read = [name for name in reads.parameters if name in values and name not in flight.shown_right]
+    held = [_held(flight, name, values[name]) for name in read]
     if "voltage" in reads.also:
         yield from (_told(one, OFF, is_shown=True) for one in _of_voltage(flight, held, why))
         return

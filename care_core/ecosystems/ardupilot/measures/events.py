@@ -16,7 +16,10 @@ from care_core.ecosystems.measures import Args, Mission, extractor, missing
 from care_core.ecosystems.vehicles import FAILSAFE, error_kind, error_words
 from care_core.logs.base import Wanted
 from care_core.run import Unavailable, Value
+from care_core.text import listed
 
+_FEW = 2
+"""Refusals that are told where nobody tried to arm."""
 _STILL_S = 0.5
 """A complaint so shortly before the last attempt to arm stood when it was refused."""
 _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
@@ -35,6 +38,18 @@ def last_refusals(mission: Mission) -> list[Refusal]:
     attempts = [one for one in refusals if one.was_tried] or list(refusals)
     standing = {one.why: one for one in refusals if one.time_s >= attempts[-1].time_s - _STILL_S}
     return sorted(standing.values(), key=lambda one: (one.time_s, one.text))
+
+
+def was_asked(mission: Mission) -> bool:
+    """Whether somebody tried to arm it: before ArduPilot 4.0 no text says so."""
+    return any(one.was_tried for one in flight_of(mission).refusals)
+
+
+def never_asked(mission: Mission) -> Unavailable:
+    """Of a vehicle that never armed, and that nobody tried to arm: what it would have said."""
+    standing = [one.why for one in last_refusals(mission)] if flight_of(mission).refusals else []
+    why = f"; it would refuse: {listed(standing[:_FEW])}" if standing else ""
+    return Unavailable(f"the vehicle never armed, and nobody asked it to{why}")
 
 
 def errors(mission: Mission) -> list[ErrorRecord]:

@@ -16,7 +16,9 @@ from care_core.ecosystems.ardupilot.measures.events import (
     forced,
     is_over,
     last_refusals,
+    never_asked,
     telling,
+    was_asked,
 )
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse, waypoint_offsets
 from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, mode_names
@@ -97,8 +99,7 @@ class ArduPilotFlight(MissionKind):
     def outcome(self, mission: Mission) -> tuple[Check, ...]:
         if is_armed(mission):
             return tuple(plain_checks(mission, and_mission=True))
-        asked_for = any(one.was_tried for one in flight_of(mission).refusals)
-        never = 0.0 if asked_for else Unavailable("the vehicle never armed, and nobody asked it to")
+        never = 0.0 if was_asked(mission) else never_asked(mission)
         return (Check("armed", never, "the vehicle armed", "arming was refused"),)
 
     def span(self, mission: Mission, phase: str) -> tuple[float, float] | None:

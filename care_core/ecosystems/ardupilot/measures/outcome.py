@@ -8,7 +8,17 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.events import CUT, NOT_FLOWN, UNRECORDED, crash_of, failed, forced, is_over
+from care_core.ecosystems.ardupilot.measures.events import (
+    CUT,
+    NOT_FLOWN,
+    UNRECORDED,
+    crash_of,
+    failed,
+    forced,
+    is_over,
+    never_asked,
+    was_asked,
+)
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, FlownMission, analyse, metres_between
 from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import mission_held
@@ -187,9 +197,9 @@ def _detected(mission: Mission, events: tuple[int, ...]) -> bool:
 def mission_success(mission: Mission, args: Args) -> Value:
     """1 when every waypoint was reached, the vehicle landed where the mission ends (within `tolerance_m` of it; a rover
     says that its mission is complete) and disarmed by itself, with no crash and no failsafe; else 0. A refused arming
-    is 0."""
+    is 0, where somebody tried to arm."""
     if not is_armed(mission):
-        return 0.0
+        return 0.0 if was_asked(mission) else never_asked(mission)
     if not flew_automatically(mission):
         return 0.0 if mission_refused(mission) else Unavailable("no mission was flown")
     if failed(mission):

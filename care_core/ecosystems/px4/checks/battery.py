@@ -1,8 +1,11 @@
-"""A battery that was not charged, and one whose voltage falls under load as no sound one's does."""
+"""A battery that was not charged, one whose voltage falls under load as no sound one's does, one that ran down, and
+one that has fewer cells than are set."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+
+import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import UNCHARGED, Finding
@@ -12,7 +15,8 @@ from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
 
 _TOPIC = "battery_status"
-READS: Wanted = {_TOPIC: ("voltage_v", "current_a", "remaining")}
+_FIELDS = ("voltage_v", "current_a", "remaining", "warning")
+READS: Wanted = {_TOPIC: _FIELDS}
 LIMITS = Limits()
 _CHARGED = LIMITS.add("charge at arming", 0.5, "of the battery", "a choice: a mission is planned with a full one")
 _TIRED = LIMITS.add("resistance of a cell", 30.0, "mOhm", "sound lithium cells have 2 to 10; old ones 20")
@@ -22,12 +26,29 @@ _LOADED = LIMITS.add("current under load", 0.5, "of the most then", "a choice: m
 _EMPTY = LIMITS.add("probability that it was not charged", 0.9, "", "training flights: 6 of 6, and none of 460 without")
 _WORN = LIMITS.add("probability that it is worn", 0.85, "", "training flights: 3 of 3, and none of 460 without")
 _LOSES = LIMITS.add("probability that a mission fails with either", 0.9, "", "training flights: 9 of 9")
+_RAN_S = LIMITS.add("time in the air at its emergency level", 1.0, "s", "a choice: a gust draws it down for less")
+_DEEP_V = LIMITS.add("voltage of a cell in the air that is emptied", 3.0, "V", "lithium cells are damaged below")
+_RAN = LIMITS.add("probability that it ran down", 0.9, "", "the firmware's own word")
+_RAN_LOSES = LIMITS.add("probability that a mission fails as it runs down", 0.7, "", "a choice: it may have come home")
+_SHORT_V = LIMITS.add("voltage of a cell at rest that is none", 3.1, "V", "nobody takes off with cells as dead as that")
+_PER_CELL = (LIMITS.add("least voltage of a cell that is", 3.5, "V", "an empty lithium cell at rest"),
+             LIMITS.add("most voltage of a cell that is", 4.25, "V", "a full one: 4.2"))  # fmt: skip
+_CELLS = LIMITS.add("probability of a wrong number of cells", 0.7, "", "a choice: they may all be dead")
+_CELLS_LOSE = LIMITS.add("probability that it loses a mission", 0.05, "", "a choice: failsafes act too soon or late")
+_BEGINS_S = LIMITS.add("time in which a log that begins armed tells of rest", 5.0, "s", "a choice: before it lifts")
+_EMERGENCY = 3
+"""battery_status.warning."""
+_CELLS_SET = ("BAT1_N_CELLS", "BAT_N_CELLS")
 _FEWEST = 3
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     table = flight.table(_TOPIC, "voltage_v", "current_a", "remaining")
-    if table is None or not flight.arming or flight.arming[0][1]:  # nothing shows it at rest
+    if table is None:
+        return
+    few = next(_fewer_cells(flight, table), None)
+    yield from (few,) if few is not None else _ran_down(flight)
+    if not flight.arming or flight.arming[0][1]:  # nothing shows it at rest
         return
     armed_s, end_s = flight.armed[0] if flight.armed else (flight.end_s, flight.end_s)
     before = table.between(table.t[0], armed_s)
@@ -39,6 +60,65 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     if len(soon):
         loaded = soon.where(soon["current_a"] > _LOADED * float(soon["current_a"].max()))
         yield from _worn(before, loaded, code(flight.log.settings(), "BAT1_N_CELLS") or 0, (armed_s, end_s))
+
+
+def _fewer_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
+    """By its voltage at rest, which no pack of so many cells has that is still flown."""
+    name = next((name for name in _CELLS_SET if code(flight.log.settings(), name)), None)
+    cells = code(flight.log.settings(), name) if name else None
+    rest = table.where((table["current_a"] < _LEAST_A) & (table.t <= table.t[0] + _BEGINS_S))
+    if name is None or not cells or len(rest) < _FEWEST:
+        return
+    volts = float(median(rest["voltage_v"]))
+    fits = [n for n in range(1, cells) if _PER_CELL[0] <= volts / n <= _PER_CELL[1]]
+    if volts / cells >= _SHORT_V or len(fits) != 1:
+        return
+    yield Finding(
+        kind="battery",
+        title="the battery has fewer cells than are set",
+        onset_s=float(rest.t[0]),
+        end_s=float(rest.t[-1]),
+        severity="warning",
+        evidence=(
+            f"{volts:.1f} V at rest: {volts / cells:.1f} V for each of the {cells} cells that {name} tells, "
+            f"{volts / fits[0]:.1f} V for each of {fits[0]}; levels, charge and failsafes are wrong with it"
+        ),
+        source=f"{_TOPIC}.voltage_v; {name}",
+        suspect="parameter",
+        probability=_CELLS,
+        mission_lost=_CELLS_LOSE,
+        parameters=(name,),
+        wanted=((name, float(fits[0])),),
+    )
+
+
+def _ran_down(flight: Px4Flight) -> Iterator[Finding]:
+    """By the firmware's own level of it, in the air."""
+    table = flight.table(_TOPIC, "voltage_v", "current_a", "warning")
+    if table is None:
+        return
+    cells = next((n for name in _CELLS_SET if (n := code(flight.log.settings(), name))), 0)
+    for span in flight.aloft:
+        flown = table.between(*span)
+        empty = flown["warning"] == _EMERGENCY
+        if len(flown) < _FEWEST or float(np.sum(np.diff(flown.t)[empty[:-1]])) < _RAN_S:
+            continue
+        low = int(np.argmin(flown["voltage_v"]))
+        volts = float(flown["voltage_v"][low])
+        deep = cells > 0 and float(np.sum(np.diff(flown.t)[(flown["voltage_v"] < _DEEP_V * cells)[:-1]])) >= _RAN_S
+        a_cell = f", {volts / cells:.2f} V a cell" if cells else ""
+        yield Finding(
+            kind="battery",
+            title="the battery ran down to its emergency level",
+            onset_s=float(flown.t[empty][0]),
+            end_s=span[1],
+            severity="critical" if deep else "warning",
+            evidence=f"{volts:.1f} V at {float(flown['current_a'][low]):.0f} A at the least{a_cell}, in the air",
+            source=f"{_TOPIC}.warning, voltage_v",
+            probability=_RAN,
+            mission_lost=_RAN_LOSES,
+        )
+        return
 
 
 def _not_charged(before: Table, armed_s: float) -> Iterator[Finding]:
