@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from care_core.diagnose.parts import mend_first
+from care_core.diagnose.parts import is_pack, mend_first
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.ecosystems.ranking import SYMPTOMS
@@ -87,7 +87,7 @@ def _undone(diagnosis: Diagnosis) -> str:
     findings = diagnosis.health.findings
     part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
     if part is not None:
-        return "charge or replace the battery" if part.kind in ("battery", "prearm") else ""
+        return "charge or replace the battery" if is_pack(part) else ""
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
     if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"

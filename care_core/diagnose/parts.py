@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding, every_finding
+from care_core.ecosystems.findings import CAME_DOWN, OWN_SUPPLY, UNCHARGED, Finding, every_finding
 from care_core.ecosystems.ranking import LIKELY
 from care_core.text import log_time
 
@@ -78,8 +78,13 @@ def _stops(finding: Finding) -> bool:
     return finding.severity == "critical" and (is_sure or at_limit)
 
 
+def is_pack(part: Finding) -> bool:
+    """Whether a part that failed is the battery itself, which is charged or replaced."""
+    return part.kind in ("battery", "prearm") and not part.title.startswith(OWN_SUPPLY)
+
+
 def unmended(part: Finding) -> str:
     """Why no parameter is changed while this part has failed."""
-    if part.kind in ("battery", "prearm"):
+    if is_pack(part):
         return f"{part.title}: charge or replace the battery; nothing is changed until it is full"
     return f"{part.title} at {log_time(part.onset_s, 0)}: nothing is changed until that is mended"

@@ -131,6 +131,8 @@ TOO_SHORT = "too little is recorded to say anything of a run"
 NOT_FLOWN = "the vehicle never armed: no run of it is in this log"
 
 
+OWN_SUPPLY = "the autopilot's own supply"
+"""What the title of a finding about the board's voltage, not the pack's, begins with."""
 UNCHARGED = "the battery was not charged"
 CAME_DOWN = "it came down and could not rise again"
 

@@ -17,7 +17,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import UNCHARGED, Finding, Severity
+from care_core.ecosystems.findings import OWN_SUPPLY, UNCHARGED, Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median
 from care_core.text import log_time
@@ -38,6 +38,7 @@ _ALIVE_V = LIMITS.add("voltage that drives a vehicle", 4.0, "V", "one full cell"
 _DRAWS_A = LIMITS.add("current that is drawn", 0.5, "A", "a choice: monitors are off by less")
 _BOARD_V = LIMITS.add("supply of the board", 4.3, "V", "ArduPilot, Power module and brown-outs")
 _BOARD_LEAST_V = LIMITS.add("supply that is measured", 0.5, "V", "a choice: below it nothing measures")
+_DIP_V = LIMITS.add("depth of a dip", 0.2, "V", "a choice: a weak but steady supply lets it fly")
 _DIPS = LIMITS.add("records of a critical dip", 5, "", "a choice: one or two may be noise")
 _CALIBRATION = calibrated(
     LIMITS,
@@ -183,14 +184,15 @@ def _board(flight: Flight) -> Iterator[Finding]:
     weak: Mask = (volts > _BOARD_LEAST_V) & (volts < _BOARD_V) & flight.watch(table.t)
     if weak.sum() < 2:
         return
-    at = table.t[weak]
+    at, least, usual = table.t[weak], float(volts[weak].min()), float(median(volts[flight.watch(table.t)]))
+    dips = usual - least > _DIP_V
     yield Finding(
         kind="battery",
-        title="the autopilot's own supply dips",
+        title=f"{OWN_SUPPLY} {'dips' if dips else 'is low'}",
         onset_s=float(at[0]),
         end_s=float(at[-1]),
-        severity=("critical" if weak.sum() > _DIPS else "warning"),
-        evidence=f"Vcc down to {volts[weak].min():.2f} V (limit {_BOARD_V})",
+        severity="critical" if dips and weak.sum() > _DIPS else "warning",
+        evidence=f"Vcc down to {least:.2f} V (limit {_BOARD_V}), {usual:.2f} V in the middle",
         source="POWR.Vcc; 4.3 V: ArduPilot, Diagnosing problems using logs",
         probability=_BOARD,
     )

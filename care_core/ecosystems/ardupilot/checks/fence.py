@@ -19,7 +19,7 @@ LIMITS = Limits()
 _BEYOND_M = LIMITS.add("what was asked for beyond the fence", 0.0, "m", "the vehicle is stopped at the fence itself")
 _WAS_SENT = LIMITS.add("probability of the fence", 0.9, "", "what was asked for lies beyond it")
 _STOPS = LIMITS.add("probability that a mission fails of it", 0.95, "", "the rest of the mission is not flown")
-_SOON_S, _BEFORE_S = 5.0, 0.1
+_BEFORE_S = 0.1
 _BY_ITSELF = frozenset(("mission", "guided"))
 _ERR_FENCE = 9
 _TOO_HIGH, _TOO_FAR = 1, 2
@@ -62,11 +62,11 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _highest(flight: Flight, at: float) -> float | None:
-    """The greatest height above home that was asked for, by the mission or, until shortly after, by its controller."""
+    """The greatest height above home that was asked for, by the mission or, until the fence acted, by its controller."""
     asked = [item.alt_m for item in _places(flight) if item.frame in _ABOVE_HOME]
     wanted = flight.one("CTUN", "DAlt")
     if wanted is not None:
-        asked += wanted["DAlt"][during(flight.airborne, wanted.t) & (wanted.t <= at + _SOON_S)].tolist()
+        asked += wanted["DAlt"][during(flight.airborne, wanted.t) & (wanted.t < at - _BEFORE_S)].tolist()
     return max(asked, default=None)
 
 
