@@ -62,7 +62,7 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _highest(flight: Flight, at: float) -> float | None:
-    """The greatest height above home that was asked for, by the mission or, until the fence acted, by its controller."""
+    """The greatest height above home that was asked for, by the mission or, until the fence acted, its controller."""
     asked = [item.alt_m for item in _places(flight) if item.frame in _ABOVE_HOME]
     wanted = flight.one("CTUN", "DAlt")
     if wanted is not None:
