@@ -90,10 +90,10 @@ def _rank(finding: Finding) -> tuple[bool, int, bool, bool]:
 
 
 def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
-    """Whether a finding is of the course of events that another began."""
+    """Whether a finding is of the course of events that another began; what somebody had set or done before is none."""
     return (
         not finding.parameters  # somebody changed them
-        and not any(one.severity == "info" and one.suspect == "parameter" for one in (root, finding))  # set so before
+        and not any(one.severity == "info" and one.suspect in ("parameter", "operation") for one in (root, finding))
         and finding.kind in reach.get(root.kind, frozenset())
         and root.onset_s <= finding.onset_s + SLACK_S
         and root.end_s >= finding.onset_s - OVER_S

@@ -32,6 +32,7 @@ _WAY_M, _STOOD = 1.0, 0.05
 """Who reaches goals over such a way has moved, and by more than this share of it."""
 _ENOUGH = 20
 """Samples that must agree before odometry is called dead."""
+_NEARLY_ALL, _A_SECOND = 0.99, 1.0
 _FEWEST = 3
 """Samples without which there is no movement to speak of."""
 
@@ -83,6 +84,19 @@ class Odometry(Record, eq=False):
         inside = (self.t >= start_s) & (self.t <= end_s)
         return float(np.sum(np.hypot(np.diff(self.x[inside]), np.diff(self.y[inside]))))
 
+    @property
+    def fastest_mps(self) -> float:
+        """The greatest speed that lasts: as its twist says, and no more than its position went in a second, where it
+        tells one. A twist that is made of single steps of an encoder has spikes."""
+        spoken = quantile(np.abs(self.speed), _NEARLY_ALL)
+        later = np.minimum(np.searchsorted(self.clock, self.clock + _A_SECOND), len(self.clock) - 1)
+        apart = self.clock[later] - self.clock
+        whole = (apart >= _A_SECOND) & (apart < 2 * _A_SECOND)
+        if self.stands_still or not whole.any():
+            return spoken
+        went = np.hypot(self.x[later] - self.x, self.y[later] - self.y)[whole] / apart[whole]
+        return min(spoken, quantile(went, _NEARLY_ALL))
+
     def spread_m(self, start_s: float) -> float:
         """Diagonal of the area that its positions lie in from a time on, m."""
         x, y = (axis[(self.t >= start_s) & np.isfinite(axis)] for axis in (self.x, self.y))
@@ -112,6 +126,8 @@ class Commands(Record, eq=False):
     speed: Floats
     sideways: Floats
     turn: Floats
+    numberless_s: Floats
+    """When commands without numbers were recorded, shape (m,)."""
 
     def way_m(self, start_s: float, end_s: float) -> float:
         """How far a robot goes that follows the commands of a time, m."""
@@ -176,7 +192,9 @@ def commands_of(topic: str, table: Table) -> Commands | None:
         return None
     speed, sideways, turn = (believable(table, type, name) for name in names)
     good = np.isfinite(speed + turn + sideways)
-    return Commands(topic, table.t[good], speed[good], sideways[good], turn[good]) if good.any() else None
+    if not good.any():
+        return None
+    return Commands(topic, table.t[good], speed[good], sideways[good], turn[good], table.t[~good])
 
 
 def never_moved(path_m: float, samples: int, way_m: float) -> bool:

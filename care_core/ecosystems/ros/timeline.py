@@ -35,7 +35,7 @@ from care_core.ecosystems.ros.other_robots import other_goals
 from care_core.ecosystems.ros.recoveries import announced, repairs
 from care_core.ecosystems.timeline import counted
 from care_core.logs.ros_message import short_name
-from care_core.numbers import Floats, quantile
+from care_core.numbers import Floats
 from care_core.text import log_time
 
 _GOALS, _MESSAGES, _REPORTS, _CHANGES = 12, 14, 6, 5
@@ -237,7 +237,7 @@ def _motion(drive: Drive) -> Iterator[Event]:
             began_s = max(0.0, float(odometry.t[rows[0]]))  # by its own stamp, which may lie before the recording
             yield Event(began_s, "motion", "the robot moves for the first time", odometry.topic)
             went = odometry.way_by_speed_m if odometry.stands_still else odometry.path_m()
-            words = f"drove {went:.1f} m in all, {quantile(np.abs(odometry.speed), 0.99):.2f} m/s at most"
+            words = f"drove {went:.1f} m in all, {odometry.fastest_mps:.2f} m/s at most"
             yield Event(end_s, "motion", words, odometry.topic)
     for battery in drive.batteries:
         words = f"battery {battery.voltage[0]:.1f} V at first, {battery.voltage[-1]:.1f} V at last"

@@ -15,12 +15,13 @@ from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import BATTERY, COMMANDS, GOALS, ODOMETRY, reading
 from care_core.ecosystems.ros.motion import BREAKS_LOOSE_MPS, Following
 from care_core.ecosystems.ros.sensors import Battery
-from care_core.numbers import Bools, Floats, known_median, median
+from care_core.numbers import Bools, Floats, known_median, median, quantile
 
 LIMITS = Limits()
 _HEALTHY = "301 healthy move_base missions"
 STANDS_S = LIMITS.add("standstill against commands", 5.0, "s", f"{_HEALTHY}: 1.5 s at most")
 STANDING = LIMITS.add("share of the command that counts as standing", 0.2, "", "noise of odometry at rest, slip")
+ORDINARY_MPS = LIMITS.add("command that no robot is too slow for", 0.5, "m/s", "a walk is faster")
 STILL = LIMITS.add("speed and turn of a standstill", 0.02, "m/s, rad/s", "noise of odometry at rest")
 SLOW_S = LIMITS.add("time below the commanded speed", 5.0, "s", f"{_HEALTHY}: 1.9 s at most")
 SLOW = LIMITS.add("share of the commanded speed", 0.7, "", f"{_HEALTHY}: below it for 1.9 s at most")
@@ -37,6 +38,7 @@ STEADY_MPS = LIMITS.add("change of a steady command", 0.15, "m/s", "a drive answ
 STEADY_RADPS = LIMITS.add("change of a steady turn", 0.3, "rad/s", "a drive answers larger steps with a lag")
 PULL_MPS = LIMITS.add("commanded speed while it pulls", 0.1, "m/s", "slower, noise of the turn is more than the pull")
 PULL_DRIVEN_MPS = LIMITS.add("speed while it pulls", 0.05, "m/s", "slower, noise of the turn is more than the pull")
+RESTS_M = LIMITS.add("way in a standstill", 0.03, "m", "it stops and starts in it")
 LOST_S = LIMITS.add("pause between samples", 3.0, "s", "over a longer one nobody knows whether the robot stood")
 SLOW_LOST_S = LIMITS.add("pause between slow samples", 2.0, "s", "over a longer one nobody knows how fast it was")
 FASTER = LIMITS.add("ratio of speeds that shows a drive was not weak", 1.3, "", "clearly more than noise of odometry")
@@ -47,12 +49,16 @@ RESTS = LIMITS.add("speed and turn at which current is idle", 0.01, "m/s, rad/s"
 SETTLES_S = LIMITS.add("time until a held drive's current is steady", 1.0, "s", "inrush of motors takes less")
 CURRENTS = LIMITS.add("samples of current in each state", 3, "", "fewer are chance")
 MOSTLY = LIMITS.add("share of slow samples that stand", 0.5, "", "with more of them it stands, and is not slow")
+FOLLOWED = LIMITS.add("share of lower commands that it follows", 0.9, "", "a weak drive follows none")
+VARIED = LIMITS.add("spread of commands that tells of a limit", 1.5, "", "a choice: of one command none is told")
+LEVEL = LIMITS.add("spread of the speeds then", 1.35, "", "a weak drive gives a share of each command")
 LATER = LIMITS.add("samples that show a drive obeys", 10, "", "fewer are too few")
 OBEYS = LIMITS.add("share of them that stand", 0.1, "", "standing still for an instant, as at each turn")
 
 
 def find(drive: Drive) -> Iterator[Finding]:
-    """Standstills against commands, short and long, weakness, and a pull to one side."""
+    """Commands that are none, standstills against commands, short and long, weakness, and a pull to one side."""
+    yield from _numberless(drive)
     motion = drive.following
     if motion is None:
         return
@@ -61,7 +67,7 @@ def find(drive: Drive) -> Iterator[Finding]:
     long = [(start, end) for start, end in still if end - start >= STANDS_S]
     if long:
         yield _standing(drive, motion, long)
-    yield from _stopping(drive, motion, [stop for stop in still if stop not in long])
+    yield from _stopping(drive, motion, [stop for stop in still if stop not in long and _rests(motion, stop)])
     slow = list(_slow(drive, motion, stood))
     yield from slow
     if not slow:  # a drive that does less than commanded turns otherwise than commanded, too
@@ -105,11 +111,31 @@ def _finding(
     )
 
 
+def _numberless(drive: Drive) -> Iterator[Finding]:
+    """Commands that are no numbers: what computes them went wrong."""
+    commands = drive.commands
+    if commands is None or not len(commands.numberless_s):
+        return
+    first, count = float(commands.numberless_s[0]), len(commands.numberless_s)
+    yield Finding(
+        kind="commands",
+        title="commands to the drive are no numbers",
+        onset_s=first,
+        end_s=float(commands.numberless_s[-1]),
+        severity=drive.severity(first),
+        evidence=f"{count} of {count + len(commands.t)} messages hold none",
+        source=commands.topic,
+        suspect="operation",
+        probability=0.8,
+    )
+
+
 def _stood(motion: Following) -> Bools:
     """Samples in which the robot stands though every command of the last second asked for motion."""
     odometry = motion.odometry
     speed, turn = np.hypot(odometry.speed, odometry.sideways), np.abs(odometry.turn)
-    wanted, wanted_turn = np.abs(motion.wanted_speed), np.abs(motion.wanted_turn)
+    most = max(odometry.fastest_mps, ORDINARY_MPS)  # of a command far beyond that even full speed is a small share
+    wanted, wanted_turn = np.minimum(np.abs(motion.wanted_speed), most), np.abs(motion.wanted_turn)
     stands = speed < np.maximum(STANDING * wanted, STILL)
     stands &= turn < np.maximum(STANDING * wanted_turn, STILL)
     # A robot that only turns where a curve was commanded does not drive either.
@@ -177,6 +203,18 @@ def _stopping(drive: Drive, motion: Following, still: list[tuple[float, float]])
             return
 
 
+def _rests(motion: Following, span: tuple[float, float]) -> bool:
+    """Whether the position says so too: a twist of a coarse encoder is zero in most samples of a steady drive."""
+    odometry = motion.odometry
+    if odometry.stands_still:
+        return True
+    first, last = np.searchsorted(odometry.t, span)
+    low, high = max(0, int(first) - 1), min(len(odometry.t) - 1, int(last) + 1)
+    went = float(np.hypot(odometry.x[high] - odometry.x[low], odometry.y[high] - odometry.y[low]))
+    wanted = float(np.abs(motion.wanted_speed[first : last + 1]).max())
+    return went <= max(STANDING * wanted, STILL) * float(odometry.t[high] - odometry.t[low]) + RESTS_M
+
+
 def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:
     """Moves, but slower than every command of the last second."""
     odometry, wanted = motion.odometry, motion.wanted_speed
@@ -190,13 +228,35 @@ def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:
     rows = np.concatenate([np.arange(first, last) for first, last in found])
     speeds, demands = np.abs(odometry.speed[ordered]), np.abs(wanted[ordered])
     reached, demanded = float(median(speeds[rows])), float(median(demands[rows]))
+    lower = demands < FOLLOWED * reached
+    follows = np.count_nonzero(lower) >= LATER and float(median(share[ordered][lower])) > FOLLOWED
+    is_level = _spread(demands[rows]) > VARIED and _spread(speeds[rows]) < LEVEL
+    if (follows or is_level) and odometry.fastest_mps < FASTER * reached:
+        yield _beyond(drive, (float(t[found[0][0]]), float(t[found[-1][1] - 1])), reached, demanded)
+        return
     # It was weak since it last was clearly faster, though nobody could see that before a higher speed was commanded.
     faster = np.flatnonzero(speeds[: found[0][0]] > FASTER * reached)
     lasting = slow & np.append(slow[1:], False) & (demands > FASTER * reached)
     since = np.flatnonzero(lasting & (np.arange(len(t)) > (faster[-1] if len(faster) else -1)))
     span = float(t[min(*since[:1], found[0][0])]), float(t[found[-1][1] - 1])
     evidence = f"reaches {reached:.2f} m/s of {demanded:.2f} m/s commanded, for {len(rows)} samples"
+    if odometry.fastest_mps < FASTER * reached:
+        evidence += "; it was never faster in this recording, which may be its limit"
     yield _finding(drive, "the drive is weak: slower than commanded", span, evidence)
+
+
+def _spread(values: Floats) -> float:
+    """How many times the largest are the smallest, without the last tenth at either end."""
+    return quantile(values, 0.9) / max(quantile(values, 0.1), STILL)
+
+
+def _beyond(drive: Drive, span: tuple[float, float], reached: float, demanded: float) -> Finding:
+    """It goes no faster than one speed, whatever more is commanded."""
+    evidence = f"whatever is commanded, it never was faster than {reached:.2f} m/s; {demanded:.2f} m/s was commanded"
+    return _finding(
+        drive, "commands are beyond what the drive reaches", span, evidence,
+        kind="commands", otherwise="info", suspect="operation", probability=0.8,
+    )  # fmt: skip
 
 
 def _slow_spans(t: Floats, slow: Bools, stood: Bools) -> list[tuple[int, int]]:

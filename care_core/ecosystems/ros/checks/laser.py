@@ -27,6 +27,7 @@ NOISE_RISES = LIMITS.add("noise against that before", 4.0, "", "a room that scat
 NOISE_SCANS = LIMITS.add("noisy scans", 5, "", "fewer are somebody who walks by")
 SCANS = LIMITS.add("scans of a laser", 8, "", "fewer do not tell what is usual")
 RAYS = LIMITS.add("rays of a scan", 30, "", "fewer do not tell noise from corners")
+RETURNS = LIMITS.add("rays that hit something in a scan that tells", 5, "", "an empty world sends none back")
 FROZEN_SCANS = LIMITS.add("scans alike to the last bit", 3, "", _FROZEN)
 FROZEN_M = LIMITS.add("way while they are alike", 0.15, "m", _FROZEN)
 FROZEN_RAD = LIMITS.add("turn while they are alike", 0.15, "rad", _FROZEN)
@@ -82,6 +83,7 @@ def _dead(drive: Drive, topic: str, last_s: float, period_s: float) -> Finding:
 
 def _frozen(drive: Drive, scans: Scans) -> Iterator[Finding]:
     same = np.array([a.tobytes() == b.tobytes() for a, b in pairwise(scans.raw)], bool)
+    same &= np.isfinite(scans.ranges[1:]).sum(axis=1) >= RETURNS  # where nothing is near, every scan is alike
     for start, end in stretches(scans.t[1:], same, BREAK_PERIODS * _period(scans)):
         rows = (scans.t >= start) & (scans.t <= end)
         if np.count_nonzero(rows) < FROZEN_SCANS or not _moved(drive, start, end):

@@ -22,6 +22,7 @@ _HEALTHY = "301 healthy move_base missions"
 _DRIFT = f"{_HEALTHY}: 97.5 % stay below"
 _WAY = "a drift shows over more than the noise of a step, or sooner where it is strong"
 JUMP_M = LIMITS.add("step beyond what speed and time allow", 0.3, "m", f"{_HEALTHY}: at most 0.07 m")
+JUMP_AT_REST_M = LIMITS.add("the same of a robot that stands", 0.15, "m", f"{_HEALTHY}: at most 0.07 m of any")
 DRIFTS = (
     (
         LIMITS.add("short way of a drift", 1.5, "m", _WAY),
@@ -37,6 +38,11 @@ SHRINK = LIMITS.add("share by which it advances less far", 0.35, "", "thin sampl
 COVERED = LIMITS.add("share of the way that is compared", 0.8, "", "over less, noise is more than drift")
 AGREED_M = LIMITS.add("way on which position and speed agreed", 0.7, "m", "else that odometry is made so")
 CORRECTION_M = LIMITS.add("step of map -> odom", 0.5, "m", "amcl corrects below update_min_d (0.2 m) times its error")
+IN_TURN_M = LIMITS.add("step of map -> odom there and back", 0.05, "m", "a localisation does not correct itself back")
+IN_TURN = LIMITS.add(
+    "share of the steps that are such", 0.25, "", "two sources of unlike rates send half or fewer in turn"
+)
+BACK = LIMITS.add("how near it is to where it was, in steps", 0.3, "", "while the robot moves, both change a little")
 PLACES = LIMITS.add("transforms of map -> odom", 3, "", "fewer show no step")
 FOUND_S = LIMITS.add("time to find the robot on the map", 5.0, "s", "the first corrections are large")
 PAUSE_S = LIMITS.add("pause between samples", STALE_S, "s", "over a longer one the speed is not known")
@@ -110,14 +116,14 @@ def _jumps(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
     dt = odometry.dt
     top = quantile(np.hypot(odometry.speed, odometry.sideways), 0.99)
     excess = went - np.maximum(most, np.where(dt > PAUSE_S, top * dt, 0.0))
-    rows = np.flatnonzero(excess > JUMP_M)
+    rows = np.flatnonzero(excess > np.where(most > 0.0, JUMP_M, JUMP_AT_REST_M))
     if not len(rows):
         return
     at, far = float(odometry.t[rows[0]]), float(went[rows[0]])
     more = f"; {len(rows)} such jumps" if len(rows) > 1 else ""
     yield Finding(
         kind="localisation",
-        title=f"odometry jumps by {far:.1f} m",
+        title=f"odometry jumps by {far:.2g} m",
         onset_s=at,
         end_s=float(odometry.t[rows[-1]]),
         severity=drive.severity(at),
@@ -160,8 +166,9 @@ def _drifting(
     typical = float(median(share[rows]))
     bend = _bend(extra, way, typical, rows[0])
     agreed = way[bend] >= AGREED_M and abs(extra[bend]) < most_share / 2 * way[bend]
-    later = extra[-1] - extra[bend]
-    if not agreed or abs(later) < abs(typical) / 2 * (way[-1] - way[bend]):
+    later, steps = extra[-1] - extra[bend], np.diff(extra[bend:])
+    alone = float(steps[np.argmax(np.abs(steps))]) if len(steps) else 0.0  # one step is no drift
+    if not agreed or (later - alone) * np.sign(typical) < abs(typical) / 2 * (way[-1] - way[bend]):
         return
     start = float(odometry.t[bend])
     word = "further" if typical > 0 else "less far"
@@ -193,6 +200,9 @@ def _corrections(drive: Drive) -> Iterator[Finding]:
             continue
         t, x, y = places.T
         steps = np.hypot(np.diff(x), np.diff(y))
+        if (turns := _in_turn(x, y, steps)) is not None:
+            yield _two_sources(drive, topic, t, turns)
+            return
         rows = np.flatnonzero(steps > CORRECTION_M)
         rows = rows[t[rows + 1] > t[0] + FOUND_S]
         if len(rows):
@@ -209,6 +219,27 @@ def _corrections(drive: Drive) -> Iterator[Finding]:
                 probability=0.7,
             )
             return
+
+
+def _in_turn(x: Floats, y: Floats, steps: Floats) -> NDArray[np.intp] | None:
+    """The steps after which the next transform is back where the one before was; None where those are few."""
+    back = np.hypot(x[2:] - x[:-2], y[2:] - y[:-2])
+    turns = np.flatnonzero((steps[:-1] > IN_TURN_M) & (back < BACK * steps[:-1]))
+    return turns if len(turns) >= IN_TURN * len(steps) and len(turns) > PLACES else None
+
+
+def _two_sources(drive: Drive, topic: str, t: Floats, turns: NDArray[np.intp]) -> Finding:
+    return Finding(
+        kind="localisation",
+        title="two sources publish map -> odom in turn",
+        onset_s=float(t[turns[0]]),
+        end_s=float(t[turns[-1] + 1]),
+        severity=drive.severity(float(t[turns[0]])),
+        evidence=f"it steps to another place and back {len(turns)} times in {len(t)} transforms",
+        source=topic,
+        suspect="operation",
+        probability=0.9,
+    )
 
 
 def _map_to_odom(t: Floats, *columns: NDArray[Any]) -> Floats:

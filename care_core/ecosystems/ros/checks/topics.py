@@ -16,6 +16,7 @@ from care_core.ecosystems.ros.messages import (
     COMMANDS,
     GOALS,
     IMU,
+    LOCALISED,
     ODOMETRY,
     ROSOUT,
     SCAN,
@@ -140,6 +141,8 @@ def _ended(drive: Drive) -> Iterator[Finding]:
         if over is None or drive.duration_s - over[0] < ENDED * drive.duration_s:
             continue
         at, period_s = over
+        if type == LOCALISED and drive.moved_between(at, drive.duration_s) < DROVE_M:
+            continue  # a localisation tells a pose where the robot has moved
         yield Finding(
             kind=_KINDS.get(type, "topics"),
             title=f"{channel.name} ends early",
