@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from care_core.diagnose.parts import is_pack
 from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
@@ -461,6 +462,43 @@ def test_a_board_that_loses_its_supply() -> None:
     made = Made()
     made.table["POWR"]["Vcc"][made.after(FAILS_S, FAILS_S + 3)] = 4.1
     assert first(made).title == "the autopilot's own supply dips"
+
+
+def test_a_supply_that_is_low_all_along_does_not_dip_and_is_no_battery() -> None:
+    made = Made()
+    made.table["POWR"]["Vcc"] = made.table["POWR"]["Vcc"] - 0.75
+    finding = first(made)
+    assert (finding.title, finding.severity) == ("the autopilot's own supply is low", "warning")
+    assert not is_pack(finding)
+
+
+@pytest.mark.parametrize(("asked", "stopped"), [(0.5, True), (0.02, False)])
+def test_a_motor_that_turns_slowly_as_it_is_told_has_not_stopped(asked: float, stopped: bool) -> None:
+    made = Made()
+    slow = made.after(FAILS_S, FAILS_S + 3)
+    made.table["RCOU"]["C1"][slow] = 1000 + 1000 * asked
+    for number in range(4):
+        rpm = np.where(made.after(UP_S, DOWN_S), 4000.0, 0.0)
+        made.table[f"ESC{number}"] = {"Instance": np.full(len(made.t), float(number)), "RPM": rpm}
+    made.table["ESC0"]["RPM"][slow] = 300.0
+    tables = made.tables()
+    parts = [tables.pop(f"ESC{number}") for number in range(4)]
+    t = np.concatenate([one.t for one in parts])
+    order = np.argsort(t, kind="stable")
+    tables["ESC"] = Table(t[order], {f: np.concatenate([one[f] for one in parts])[order] for f in ("Instance", "RPM")})
+    found = find(flight_of(tables, made.known, made.facts))
+    assert any(one.title == "motor 1 (front right) stopped" for one in found) is stopped
+
+
+def test_a_fence_is_held_against_what_was_asked_before_it_acted() -> None:
+    made = Made()
+    made.settings |= {"FENCE_ALT_MAX": HEIGHT_M + 2.0, "RTL_ALT": 9000}
+    made.rows["MODE"] = [(0.0, {"ModeNum": 3.0}), (50.0, {"ModeNum": 6.0})]
+    made.rows["ERR"] = [(50.0, {"Subsys": 9.0, "ECode": 1.0})]
+    made.table["CTUN"]["DAlt"][made.t >= 50.0] = 90.0
+    assert "it was sent across its fence" not in [one.title for one in made.find()]
+    made.table["CTUN"]["DAlt"][made.t >= 45.0] = 90.0
+    assert "it was sent across its fence" in [one.title for one in made.find()]
 
 
 def test_a_monitor_that_does_not_move() -> None:

@@ -13,7 +13,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.findings import every_finding
 from care_core.logs.base import Table
 from care_core.run import Setting
-from tests.flights import ARMED_S, DOWN_S, END_S, Made, flight_of
+from tests.flights import ARMED_S, DOWN_S, END_S, UP_S, Made, flight_of
 
 LATER_S = 200.0
 """When the second flight's record begins."""
@@ -104,3 +104,18 @@ def test_a_copter_on_its_back_has_crashed_where_its_motors_had_just_worked(throt
     made.table["CTUN"]["ThO"][(made.t > DOWN_S) & (made.t < DOWN_S + 4.5)] = throttle
     made.rows["ARM"] = made.rows["ARM"][:1]
     assert (made.flight().lost_control_s is not None) is lies
+
+
+@pytest.mark.parametrize(("lean_deg", "lies"), [(65.0, True), (25.0, False)])
+def test_a_copter_that_lies_on_its_side_did_not_land(lean_deg: float, lies: bool) -> None:
+    made = Made()
+    made.table["ATT"]["Roll"][made.t >= DOWN_S + 2.0] = lean_deg
+    assert (made.flight().lost_control_s is not None) is lies
+
+
+@pytest.mark.parametrize(("rate", "tips"), [(1900.0, True), (300.0, False)])
+def test_a_flip_that_is_faster_than_the_record_of_the_attitude_is_seen_in_the_rates(rate: float, tips: bool) -> None:
+    made = Made()
+    spins = (made.t >= UP_S + 0.5) & (made.t <= UP_S + 0.75)
+    made.table["RATE"] = {"R": 0.0 * made.t, "P": np.where(spins, rate, 0.0)}
+    assert (made.flight().lost_control_s is not None) is tips

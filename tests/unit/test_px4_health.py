@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from care_core.ecosystems.dictionary import find_field
 from care_core.ecosystems.findings import Health
 from care_core.ecosystems.px4.examining import examine, reads
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.px4.messages import MESSAGES
+from care_core.ecosystems.px4.upset import falls_after
 from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.formats import LogFormat
@@ -174,6 +176,21 @@ def test_what_falls_after_the_kill_switch_is_the_kill_switchs_doing() -> None:
     assert killed(0.1).findings == ()  # a pilot killed what did not let itself be disarmed
 
 
+@pytest.mark.parametrize(("felt", "killed"), [(9.7, False), (1.0, True)])
+def test_motors_that_are_killed_on_the_ground_fell_nowhere_whatever_the_height_says(felt: float, killed: bool) -> None:
+    t = np.arange(0.0, 50.0, 0.02)
+    force = np.where((t > 40.0) & (t < 40.5), felt, 9.7)
+    flight = Px4Flight(MadeLog({
+        "vehicle_status": FLOWN,
+        "vehicle_local_position": states(z=[(0, 0.0), (12, -1.6)]),
+        "vehicle_land_detected": states(landed=[(0, 1), (12, 0)]),
+        "logged_messages": words((40.0, "WARNING", "[commander] Kill-switch engaged\t")),
+        "sensor_combined": Table(t, {f"accelerometer_m_s2[{n}]": force * (n == 2) for n in range(3)}),
+    }))  # fmt: skip
+    assert ("the kill switch cut the motors in the air" in [one.title for one in examine(flight).findings]) is killed
+    assert falls_after(flight, 40.0) is killed
+
+
 def test_the_failure_detector_has_the_time_at_which_it_acted() -> None:
     def flown(**topics: Table) -> Px4Flight:
         return Px4Flight(MadeLog({"vehicle_status": FLOWN, **topics}))
@@ -289,6 +306,22 @@ def test_a_battery_is_told_by_its_charge_and_by_its_fall_under_load() -> None:
     assert flown(1.0, 16.1) == []
     assert flown(0.3, 16.1) == [("battery", "the battery was not charged", 10.0)]
     assert flown(1.0, 12.5) == [("battery", "the battery's voltage falls under load", 10.0)]
+
+
+def test_a_battery_that_runs_down_in_the_air_is_told_and_one_with_fewer_cells_than_are_set() -> None:
+    def flown(rest_v: float, least_v: float, level: int) -> list[tuple[str, str]]:
+        log = MadeLog({
+            "vehicle_status": FLOWN,
+            "vehicle_local_position": states(z=[(0, 0.0), (20, -10.0), (48, 0.0)]),
+            "battery_status": states(voltage_v=[(0, rest_v), (30, least_v)], current_a=[(0, 0.5), (19, 20.0)],
+                                     remaining=[(0, 0.9)], warning=[(0, 0), (30, level)]),
+        }, parameters={"BAT1_N_CELLS": (Setting("BAT1_N_CELLS", 4.0, "PX4 parameters"),)})  # fmt: skip
+        return [(one.title, one.severity) for one in examine(Px4Flight(log)).findings]
+
+    assert flown(16.4, 14.0, 2) == []
+    assert flown(16.4, 13.2, 3) == [("the battery ran down to its emergency level", "warning")]
+    assert flown(16.4, 10.0, 3) == [("the battery ran down to its emergency level", "critical")]
+    assert flown(11.6, 9.9, 3) == [("the battery has fewer cells than are set", "warning")]
 
 
 def test_a_battery_that_keeps_it_from_arming_is_the_battery() -> None:

@@ -291,3 +291,8 @@ def test_a_check_that_takes_one_value_asks_for_it() -> None:
     assert Must("SERVO1_FUNCTION", "=", "33").value_of("SERVO1_FUNCTION") == 33.0
     assert Must("SERVO1_FUNCTION", "!=", "0").value_of("SERVO1_FUNCTION") is None
     assert Must("MOT_PWM_MAX", "=", "MOT_PWM_MIN").value_of("MOT_PWM_MAX") is None
+
+
+def test_a_receiver_that_has_a_fix_is_of_the_right_type() -> None:
+    assert refused("GPS 1: Bad fix", GPS_TYPE=(9, 1)).parameters == ()
+    assert refused("GPS 2: Bad fix", GPS_TYPE2=(9, 1)).parameters == ("GPS_TYPE2",)

@@ -18,7 +18,7 @@ from care_core.ecosystems.ros.checks import odometry
 from care_core.ecosystems.ros.checks.messages import gist
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
-from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SCAN, SUCCEEDED, Drive
+from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SCAN, SUCCEEDED, TWIST, Drive
 from tests.ros_samples import (
     ROS2,
     SECOND_NS,
@@ -334,3 +334,86 @@ def test_a_transform_whose_fields_are_declared_as_what_they_are_not_says_nothing
     assert len(odometry._map_to_odom(t, *columns(good, good | wrong))) == 1
     scalars = [np.array([7, 7], dtype=object)] * 4
     assert len(odometry._map_to_odom(t, *scalars)) == 0
+
+
+Change = Callable[[Any, float], None]
+
+
+def changed(kind: str, change: Change) -> Drive:
+    """A healthy drive of which messages of one kind are changed."""
+
+    class Changed(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                if name == kind:
+                    change(message, time_s)
+                yield topic, name, time_s, message
+
+    return Changed()
+
+
+def sees_nothing(scan: Any, time_s: float) -> None:
+    scan.ranges[:] = np.inf
+
+
+def in_spikes(odometry: Any, time_s: float) -> None:
+    """Each third sample holds what a coarse encoder counted in three."""
+    third = round(time_s / 0.2) % 3 == 0
+    odometry.twist.twist.linear.x *= 3.0 if third else 0.0
+    odometry.twist.twist.angular.z *= 3.0 if third else 0.0
+
+
+def no_number(command: Any, time_s: float) -> None:
+    if time_s > 39.0:
+        command.linear.x = float("nan")
+
+
+def one_step(odometry: Any, time_s: float) -> None:
+    """The robot stands from half of the way on, and is then elsewhere by less than a jump of what drives."""
+    odometry.pose.pose.position.x += 0.24 if time_s > 30.0 else 0.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "titles"),
+    [
+        (SCAN, sees_nothing, []),
+        (ODOMETRY, in_spikes, []),
+        (TWIST, no_number, ["commands to the drive are no numbers"]),
+        (ODOMETRY, one_step, []),
+    ],
+)
+def test_what_looks_like_a_fault_and_is_none(kind: str, change: Change, titles: list[str], tmp_path: Path) -> None:
+    assert [one.title for one in looked_at(changed(kind, change), tmp_path).findings] == titles
+
+
+def test_a_drive_that_never_is_faster_whatever_is_commanded_has_its_limit(tmp_path: Path) -> None:
+    class Limited(Drive):
+        """Reaches 0.3 m/s; commands rise from that to three times as much."""
+
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                if name == TWIST:
+                    message.linear.x = 0.3 + 0.02 * time_s
+                yield topic, name, time_s, message
+
+        def _move(self, speed: float, turn: float, *, onset: bool, failing: bool) -> None:
+            super()._move(0.3, turn, onset=onset, failing=failing)
+
+        def _odometry(self, t: float, speed: float, turn: float) -> Any:
+            return super()._odometry(t, 0.6 * speed, turn)
+
+    (finding,) = looked_at(Limited(), tmp_path).findings
+    assert (finding.title, finding.severity) == ("commands are beyond what the drive reaches", "info")
+    assert "never was faster than 0.30 m/s" in finding.evidence
+
+
+def test_the_greatest_speed_that_is_told_lasted(tmp_path: Path) -> None:
+    (said,) = [one for one in looked_at(changed(ODOMETRY, in_spikes), tmp_path).timeline if "at most" in one.text]
+    assert "0.5" in said.text.partition("m in all, ")[2]
+
+
+@pytest.mark.parametrize(("places", "told"), [((0.0, 1.5), "two sources publish map -> odom in turn"), ((0.0,), "")])
+def test_two_sources_of_one_transform_are_told(places: tuple[float, ...], told: str) -> None:
+    x = np.array([places[n % len(places)] + 0.001 * n for n in range(60)])
+    steps = np.abs(np.diff(x))
+    assert (odometry._in_turn(x, np.zeros(60), steps) is not None) is bool(told)

@@ -16,6 +16,7 @@ from care_core.ecosystems.ros.messages import BATTERY, COMMANDS, GOALS, ODOMETRY
 from care_core.ecosystems.ros.motion import BREAKS_LOOSE_MPS, Following
 from care_core.ecosystems.ros.sensors import Battery
 from care_core.numbers import Bools, Floats, known_median, median, quantile
+from care_core.records import replace
 
 LIMITS = Limits()
 _HEALTHY = "301 healthy move_base missions"
@@ -253,10 +254,9 @@ def _spread(values: Floats) -> float:
 def _beyond(drive: Drive, span: tuple[float, float], reached: float, demanded: float) -> Finding:
     """It goes no faster than one speed, whatever more is commanded."""
     evidence = f"whatever is commanded, it never was faster than {reached:.2f} m/s; {demanded:.2f} m/s was commanded"
-    return _finding(
-        drive, "commands are beyond what the drive reaches", span, evidence,
-        kind="commands", otherwise="info", suspect="operation", probability=0.8,
-    )  # fmt: skip
+    title = "commands are beyond what the drive reaches"
+    found = _finding(drive, title, span, evidence, kind="commands", suspect="operation", probability=0.8)
+    return replace(found, severity="info")  # it drives as it can
 
 
 def _slow_spans(t: Floats, slow: Bools, stood: Bools) -> list[tuple[int, int]]:
