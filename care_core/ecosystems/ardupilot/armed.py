@@ -94,7 +94,8 @@ class Armed(Recorded):
         """Spans armed by the records of arming. A log whose first word is a disarming was armed from its start. What is
         armed once more was disarmed between, as far as nothing is recorded before: the logger was closed."""
         spans: list[Span] = []
-        start = 0.0 if self.arm_changes and not self.arm_changes[0].is_armed else None
+        first = self.arm_changes[0] if self.arm_changes else None
+        start = self._armed_unseen(first.time_s) if first is not None and not first.is_armed else None
         for change in self.arm_changes:
             if start is not None:
                 spans.append((start, self._recorded_before(change.time_s) if change.is_armed else change.time_s))
@@ -102,6 +103,17 @@ class Armed(Recorded):
         if start is not None:
             spans.append((start, self.end_s))
         return tuple(span for span in spans if span[1] > span[0])
+
+    def _armed_unseen(self, disarmed_s: float) -> float:
+        """When a vehicle was armed whose first word is a disarming: before the log, or, where arming was refused first,
+        as the logger was opened again."""
+        refused_s = max((one.time_s for one in self.refusals if one.time_s < disarmed_s), default=None)
+        table = self.one("ATT", "Roll")
+        if refused_s is None or table is None:
+            return 0.0
+        t = table.t[(table.t >= refused_s) & (table.t <= disarmed_s)]
+        silent = np.flatnonzero(np.diff(t) > _CLOSED_S)
+        return float(t[silent[-1] + 1]) if len(silent) else 0.0
 
     def _opened_at(self, t: float) -> float:
         """When an arming was recorded that opened the logger: firmware before 3.4 gives the record no time of its own,

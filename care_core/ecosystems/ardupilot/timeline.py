@@ -11,11 +11,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby, pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from care_core.ecosystems.ardupilot.armed import ArmChange
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.recorded import Mode
 from care_core.ecosystems.ardupilot.spans import Span
+from care_core.ecosystems.ardupilot.statistics import records
 from care_core.ecosystems.ardupilot.supply_events import supply_events
 from care_core.ecosystems.ardupilot.texts import (
     RECORDED,
@@ -76,6 +78,8 @@ _SAME_S = 2.0
 _SWITCHED_OFF_S = 0.05
 _FLICKERS_S = 1.0
 """A land detector that changes its mind sooner has not seen a flight, nor a landing."""
+_STAYS_S, _SPIKE_M = 1.0, 10.0
+"""Who is somewhere stays for as long, within so much: no copter turns back in less."""
 _IN_AIR_M, _LIFTED_M = 2.0, 0.5
 
 
@@ -278,15 +282,21 @@ def _flown(flight: Flight) -> Iterator[Event]:
 
 
 def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | None:
-    """When a vehicle that flies was highest while armed, and how high."""
+    """When a vehicle that flies was highest while armed, and how high: where it stayed for a second if what is more is a
+    spike of its barometer."""
     known = flight.height
     if known is None or flight.kind in ("rover", "sub"):
         return None
     t, height = known
     inside = np.flatnonzero((t >= start) & (t <= end) & np.isfinite(height))
-    if not len(inside):
+    if len(inside) < 3:
         return None
-    top = inside[np.argmax(height[inside])]
+    t, height = t[inside], height[inside]
+    n = min(records(t, _STAYS_S), len(t))
+    stayed = sliding_window_view(height, n).min(axis=1)
+    top, lasting = int(np.argmax(height)), int(np.argmax(stayed)) + n // 2
+    if float(height[top] - stayed.max()) > _SPIKE_M:
+        return float(t[lasting]), float(stayed.max())
     return float(t[top]), float(height[top])
 
 

@@ -144,7 +144,8 @@ def _took_off(mission: Mission, *, crashed: bool) -> Value:
     flew = lifted and ((len(heights) and bool(heights.max() > AIRBORNE_M)) or _detected(mission, _TOOK_OFF))
     if flew or crashed:
         return float(flew)
-    if lifted and len(heights) and heights.max() > _BARELY_M:
+    barely = lifted and len(heights) and bool(heights.max() > _BARELY_M)
+    if barely or (len(heights) and _detected(mission, _TOOK_OFF)):
         return Unavailable(f"it rose no higher than {heights.max():.1f} m: too little to tell a flight by")
     return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
 
