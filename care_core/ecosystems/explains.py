@@ -6,6 +6,7 @@ upsets the estimator through an attitude that was lost, not past one that was he
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from care_core.ecosystems.findings import FindingKind
@@ -62,3 +63,16 @@ EXPLAINS: Explains = {
     ),
 }  # fmt: skip
 """By physics, not by statistics. A compass loses no fix, and a battery makes no gyro noisy."""
+
+_ESTIMATED = "ekf|ahrs|dcm|position|home|velocity|variance"
+_WORDS: Mapping[FindingKind, str] = {
+    "gps": f"gps|fix|hdop|satell|fence|{_ESTIMATED}",
+    "compass": f"compass|mag|heading|yaw|{_ESTIMATED}",
+    "barometer": f"baro|alt|height|vertical|{_ESTIMATED}",
+    "imu": f"imu|ins|gyro|accel|attitude|roll|{_ESTIMATED}",
+    "airspeed": "airspeed|pitot",
+    "battery": "batt|volt|power",
+    "estimator": f"gps|compass|yaw|attitude|estimat|{_ESTIMATED}",
+}
+REFUSES = {kind: re.compile(rf"\b({words})", re.IGNORECASE) for kind, words in _WORDS.items()}
+"""What a refusal to arm speaks of where a part keeps the vehicle from arming: any other has a reason of its own."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from care_core.ecosystems.explains import EXPLAINS, Explains
+from care_core.ecosystems.explains import EXPLAINS, REFUSES, Explains
 from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.records import replace
 
@@ -95,9 +95,18 @@ def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
         not finding.parameters  # somebody changed them
         and not any(one.severity == "info" and one.suspect in ("parameter", "operation") for one in (root, finding))
         and finding.kind in reach.get(root.kind, frozenset())
+        and _may_refuse(root, finding)
         and root.onset_s <= finding.onset_s + SLACK_S
         and root.end_s >= finding.onset_s - OVER_S
         and (finding.probability < LIKELY or (root.probability >= LIKELY and not _only_set(root, finding)))
+    )
+
+
+def _may_refuse(cause: Finding, finding: Finding) -> bool:
+    """Whether a refusal to arm speaks of what a part that failed keeps it from; of anything else there is none."""
+    speaks = REFUSES.get(cause.kind)
+    return (
+        finding.kind != "prearm" or speaks is None or speaks.search(f"{finding.title} {finding.evidence}") is not None
     )
 
 

@@ -69,6 +69,8 @@ _SIMULATED_HIT = re.compile(r"SIM Hit ground at (\d+(?:\.\d+)?) m/s")
 _BEFORE_OVER_S, _ON_SIDE_DEG = 3.0, 50.0
 """Motors that worked so shortly before a copter lay on its back or its side turned it over, or let it fall; no ground
 that a copter stands on is so steep."""
+_FLEW_S = 5.0
+"""What lies on its side fell so shortly after it flew; later it lay where it had come down, its motors up or not."""
 _SPINS_DEG_S, _HALF_TURN_DEG = 400.0, 180.0
 """A copter that turns so fast about its level axes, and so far, in a mode that keeps it level has turned over."""
 _TAXIES_MS = 8.0
@@ -236,6 +238,9 @@ class Airborne(Armed):
         if not over or over[-1][1] < t[-1] - _STRUCK_S or over[-1][1] - over[-1][0] < _STRUCK_S:
             return None
         start = over[-1][0]
+        is_on_back = bool(tilt[t >= start].max() > UPSIDE_DOWN_DEG)
+        if not is_on_back and not any(a <= start <= b + _FLEW_S for a, b in self.airborne):
+            return None  # it lay where it had come down
         before = t[(t > start - _BEFORE_OVER_S) & (t <= start)]
         return start if self._is_driven(before).any() else None
 
@@ -246,7 +251,8 @@ class Airborne(Armed):
         if table is None or not self.armed:
             return None
         t, rate = table.t, np.maximum(np.abs(table["R"]), np.abs(table["P"]))
-        for start, end in runs(t, (rate > _SPINS_DEG_S) & during(self.armed, t)):
+        matters = during(self.airborne, t) | during(self._lifting_off, t)
+        for start, end in runs(t, (rate > _SPINS_DEG_S) & matters):
             at, turns = t[(t >= start) & (t <= end)], rate[(t >= start) & (t <= end)]
             turned = float(np.sum(np.diff(at) * (turns[1:] + turns[:-1]) / 2))
             if turned > _HALF_TURN_DEG and self._is_driven(at[:1]).any():

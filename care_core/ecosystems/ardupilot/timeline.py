@@ -282,7 +282,7 @@ def _flown(flight: Flight) -> Iterator[Event]:
 
 
 def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | None:
-    """When a vehicle that flies was highest while armed, and how high: where it stayed for a second if what is more is a
+    """When a vehicle that flies was highest while armed, and how high: where it stayed for a second if more is but a
     spike of its barometer."""
     known = flight.height
     if known is None or flight.kind in ("rover", "sub"):
