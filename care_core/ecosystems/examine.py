@@ -12,7 +12,7 @@ def examine(model: RunModel) -> Health:
     """Timeline and findings of a log."""
     log = model.log
     health = ecosystem_of(log.format).examine(model)
-    if health.findings or not health.too_little:
+    if not health.too_little or any(one.severity != "info" for one in health.findings):
         return health
     # An answer too: whoever reads the findings must not take none for fine.
     nothing = Finding(
@@ -25,4 +25,4 @@ def examine(model: RunModel) -> Health:
         source=WHOLE_LOG,
         suspect="world",
     )
-    return replace(health, findings=(nothing,))
+    return replace(health, findings=(*health.findings, nothing))

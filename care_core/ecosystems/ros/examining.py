@@ -36,7 +36,7 @@ def examine(drive: Drive) -> Health:
     """What happened in a ROS 1 bag or a ROS 2 drive."""
     others = [(other, _found(other)) for other in drive.others]
     findings = rank_findings((*_found(drive), *other_robots(drive, others)))
-    return Health(_robot(drive), timeline(drive), findings, "" if findings else _too_little(drive))
+    return Health(_robot(drive), timeline(drive), findings, _too_little(drive))
 
 
 def _found(drive: Drive) -> tuple[Finding, ...]:
