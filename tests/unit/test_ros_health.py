@@ -417,3 +417,17 @@ def test_two_sources_of_one_transform_are_told(places: tuple[float, ...], told: 
     x = np.array([places[n % len(places)] + 0.001 * n for n in range(60)])
     steps = np.abs(np.diff(x))
     assert (odometry._in_turn(x, np.zeros(60), steps) is not None) is bool(told)
+
+
+def test_a_laser_that_pauses_again_and_again_while_the_odometry_goes_on_drops_out(tmp_path: Path) -> None:
+    class Pausing(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            gone = (SCAN, ODOMETRY) if self.fault == "link" else (SCAN,)
+            for topic, name, time_s, message in super().messages():
+                if name not in gone or not any(start < time_s < start + 1.5 for start in (8.0, 17.0, 25.0)):
+                    yield topic, name, time_s, message
+
+    (finding,) = looked_at(Pausing(), tmp_path).findings
+    assert (finding.kind, finding.title) == ("laser", "the laser drops out: /front/scan pauses")
+    assert finding.evidence.startswith("3 pauses of up to 1.6 s, one scan every 0.2 s else")
+    assert not [one for one in looked_at(Pausing("link"), tmp_path).findings if "drops out" in one.title]

@@ -31,6 +31,10 @@ RETURNS = LIMITS.add("rays that hit something in a scan that tells", 5, "", "an 
 FROZEN_SCANS = LIMITS.add("scans alike to the last bit", 3, "", _FROZEN)
 FROZEN_M = LIMITS.add("way while they are alike", 0.15, "m", _FROZEN)
 FROZEN_RAD = LIMITS.add("turn while they are alike", 0.15, "rad", _FROZEN)
+DROPS = LIMITS.add("pauses of the scans alone", 3, "", "one or two are chance")
+DROPS_S = LIMITS.add("such a pause", 1.0, "s", "a choice: a robot of 0.5 m/s goes half a metre blind")
+DROPS_PERIODS = LIMITS.add("such a pause, in periods", 6.0, "", "a choice: of recordings that are thinned")
+HEARD = LIMITS.add("share of the odometry that came in it", 0.6, "", "else the link or the recorder paused")
 BREAK_PERIODS = LIMITS.add("break in a fault, in periods", 2.5, "", "one scan may be lost")
 NOISE_BREAK_PERIODS = LIMITS.add("break in noise, in periods", 3.5, "", "two scans may see a smooth wall")
 BLIND = LIMITS.add("share of rays that return to a blind laser", 0.02, "", "stray returns")
@@ -48,6 +52,8 @@ def find(drive: Drive) -> Iterator[Finding]:
             silent = drive.ends_early(channel.name)
             if silent is not None:
                 yield _dead(drive, channel.name, *silent)
+            else:
+                yield from _dropping(drive, channel.name)
     for scans in drive.scans:
         yield from faults(drive, scans)
 
@@ -79,6 +85,29 @@ def _dead(drive: Drive, topic: str, last_s: float, period_s: float) -> Finding:
     words = f'; {complaint.node}: "{shortened(complaint.text, 80)}"' if complaint is not None else ""
     evidence = f"no scan for the last {drive.duration_s - last_s:.0f} s, one every {period_s:.2g} s before{words}"
     return _finding(drive, f"the laser falls silent: {topic} ends", (last_s, drive.duration_s), evidence, topic)
+
+
+def _dropping(drive: Drive, topic: str) -> Iterator[Finding]:
+    """Scans that fail to come again and again while the odometry goes on: no link and no recorder lost those."""
+    odometry, period_s, times = drive.odometry, drive.streams.get(topic), drive.times[topic]
+    if odometry is None or period_s is None:
+        return
+    rows = np.flatnonzero(np.diff(times) > max(DROPS_S, DROPS_PERIODS * period_s))
+    spans = [(float(times[row]), float(times[row + 1])) for row in rows]
+    beside = odometry.recorded_s
+    usual_s = float(median(np.diff(beside)))
+    alone = [(a, b) for a, b in spans if _heard(beside, a, b) * usual_s > HEARD * (b - a)]
+    if len(alone) < DROPS:
+        return
+    most = max(b - a for a, b in alone)
+    evidence = (
+        f"{len(alone)} pauses of up to {most:.1f} s, one scan every {period_s:.2g} s else; {odometry.topic} went on"
+    )
+    yield _finding(drive, f"the laser drops out: {topic} pauses", (alone[0][0], alone[-1][1]), evidence, topic, 0.7)
+
+
+def _heard(times: Floats, start: float, end: float) -> int:
+    return int(np.count_nonzero((times > start) & (times < end)))
 
 
 def _frozen(drive: Drive, scans: Scans) -> Iterator[Finding]:
