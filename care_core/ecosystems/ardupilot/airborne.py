@@ -230,19 +230,24 @@ class Airborne(Armed):
     def _overturned_s(self) -> float | None:
         """When a copter whose motors had just worked turned over, and lay on its back or its side to the end; None
         where it did not: whatever its height says, that is no landing."""
+        on_back = self._lay_s(UPSIDE_DOWN_DEG)
+        if on_back is not None:
+            return on_back
+        on_side = self._lay_s(_ON_SIDE_DEG)
+        flew = on_side is not None and any(a <= on_side <= b + _FLEW_S for a, b in self.airborne)
+        return on_side if flew else None
+
+    def _lay_s(self, lean_deg: float) -> float | None:
+        """Since when it leaned by more than this, to the end, if its motors had just worked."""
         assert self.tilt is not None
         t, tilt = self.tilt
         if not self.armed:
             return None
-        over = runs(t, (tilt > _ON_SIDE_DEG) & (t >= self.armed[0][0]), gap_s=_STRUCK_S)
+        over = runs(t, (tilt > lean_deg) & (t >= self.armed[0][0]), gap_s=_STRUCK_S)
         if not over or over[-1][1] < t[-1] - _STRUCK_S or over[-1][1] - over[-1][0] < _STRUCK_S:
             return None
         start = over[-1][0]
-        is_on_back = bool(tilt[t >= start].max() > UPSIDE_DOWN_DEG)
-        if not is_on_back and not any(a <= start <= b + _FLEW_S for a, b in self.airborne):
-            return None  # it lay where it had come down
-        before = t[(t > start - _BEFORE_OVER_S) & (t <= start)]
-        return start if self._is_driven(before).any() else None
+        return start if self._is_driven(t[(t > start - _BEFORE_OVER_S) & (t <= start)]).any() else None
 
     @property
     def _spun_s(self) -> float | None:
