@@ -13,7 +13,7 @@ from care_core.ecosystems.px4.flight import FLAGS, MESSAGES, RESULT, STATUS
 from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.px4.measures.flown import NEEDS, NOT_FLOWN, flight_of, flown_mission, is_armed
 from care_core.ecosystems.px4.measures.route import landing_error
-from care_core.ecosystems.vehicles import way_of
+from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.logs.base import Wanted, merge_needs
 from care_core.run import Unavailable, Value, is_known
 from care_core.text import log_time
@@ -126,8 +126,11 @@ def _flown_whole(mission: Mission) -> Value:
     if not has(mission.table(RESULT), "seq_reached"):
         return Unavailable("the log does not say which items were reached", f"record {RESULT}", RESULT)
     if not flown.all_reached:
-        outcome = mission_outcome(flight_of(mission), (mission.start_s, mission.end_s))
-        return outcome if flown.items is None else 0.0
+        flight, span = flight_of(mission), (mission.start_s, mission.end_s)
+        last = flight.modes_during(span)[-1]
+        if way_of("px4", last) == "manual":  # what somebody broke off did not fail
+            return Unavailable(f"the mission was not flown to its end, the last mode was {mode_name('px4', last)}")
+        return mission_outcome(flight, span) if flown.items is None else 0.0
     off_m = landing_error(mission, {})
     if flown.end is None:
         return 1.0
