@@ -41,8 +41,9 @@ _GLIDES = frozenset(("plane", "quadplane"))
 """What lands where it finds room: its last height says little."""
 _MOVED_M = 5.0
 """A receiver that stands still wanders by its accuracy, 2 to 3 m."""
-_BARELY_M = 0.5
-"""Rise below which a vehicle never left the ground: barometers drift by less in a flight's time."""
+_BARELY_M, _HOVERS_M = 0.5, 0.2
+"""Rise below which a vehicle never left the ground: barometers drift by less in a flight's time; and where its own
+detector says that it left it."""
 _TOUCHED_S, _SWITCHED_OFF_S = 5.0, 0.05
 """Before the disarming, where the land detector found the ground: at most, and at least (disarming sets it as well)."""
 HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
@@ -144,8 +145,8 @@ def _took_off(mission: Mission, *, crashed: bool) -> Value:
     flew = lifted and ((len(heights) and bool(heights.max() > AIRBORNE_M)) or _detected(mission, _TOOK_OFF))
     if flew or crashed:
         return float(flew)
-    barely = lifted and len(heights) and bool(heights.max() > _BARELY_M)
-    if barely or (len(heights) and _detected(mission, _TOOK_OFF)):
+    least_m = _BARELY_M if lifted else _HOVERS_M if _detected(mission, _TOOK_OFF) else np.inf
+    if len(heights) and heights.max() > least_m:
         return Unavailable(f"it rose no higher than {heights.max():.1f} m: too little to tell a flight by")
     return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
 
