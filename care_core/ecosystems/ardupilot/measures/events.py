@@ -18,6 +18,8 @@ from care_core.logs.base import Wanted
 from care_core.run import Unavailable, Value
 from care_core.text import listed
 
+_TELLS = (4, 1)
+"""From here on "Arm:" instead of "PreArm:" begins whatever an attempt to arm complains of (AP_Arming.cpp)."""
 _FEW = 2
 """Refusals that are told where nobody tried to arm."""
 _STILL_S = 0.5
@@ -41,15 +43,18 @@ def last_refusals(mission: Mission) -> list[Refusal]:
 
 
 def was_asked(mission: Mission) -> bool:
-    """Whether somebody tried to arm it: before ArduPilot 4.0 no text says so."""
+    """Whether a text says that somebody tried to arm it."""
     return any(one.was_tried for one in flight_of(mission).refusals)
 
 
 def never_asked(mission: Mission) -> Unavailable:
-    """Of a vehicle that never armed, and that nobody tried to arm: what it would have said."""
-    standing = [one.why for one in last_refusals(mission)] if flight_of(mission).refusals else []
+    """Of a vehicle that never armed, and that nobody tried to arm as far as is known: what it would have said."""
+    flight = flight_of(mission)
+    standing = [one.why for one in last_refusals(mission)] if flight.refusals else []
     why = f"; it would refuse: {listed(standing[:_FEW])}" if standing else ""
-    return Unavailable(f"the vehicle never armed, and nobody asked it to{why}")
+    tells = flight.vehicle.version is not None and flight.vehicle.version[:2] >= _TELLS
+    asked = "nobody asked it to" if tells else "its firmware does not say whether anybody asked it to"
+    return Unavailable(f"the vehicle never armed, and {asked}{why}")
 
 
 def errors(mission: Mission) -> list[ErrorRecord]:
