@@ -273,7 +273,11 @@ def _by_names(names: Sequence[str], *, is_inside: bool) -> Keys:
 
 
 def _ros1_place(entry: Entry, keys: Keys, owners: Mapping[Keys, Keys], values: Mapping[Keys, Entry]) -> Place:
-    """The nearest namespace with a reader, and the name that this one has for the value."""
+    """The nearest namespace with a reader, and the name that this one has for the value.
+
+    A source that a costmap itself names is moved to its obstacle layer (costmap_2d_ros.cpp of noetic,
+    loadOldParameters): files from before Hydro list no layers.
+    """
     for depth in range(len(keys), -1, -1):
         found = owners.get(keys[:depth], ())
         if not found:
@@ -283,7 +287,7 @@ def _ros1_place(entry: Entry, keys: Keys, owners: Mapping[Keys, Keys], values: M
             return Place(entry, found, name, keys[:depth])
         sources = words_of(values.get((*keys[:depth], "observation_sources")))
         if len(keys) - depth == 1 and keys[depth] in sources:
-            return Place(entry, found, name, keys[:depth])
+            return Place(entry, _LAYERS_BY_NAME["obstacle_layer"] if found == (COSTMAP,) else found, name, keys[:depth])
         break
     return Place(entry, (), entry.keys[-1], keys)
 

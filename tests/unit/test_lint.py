@@ -75,6 +75,22 @@ def test_a_key_that_another_plugin_reads_is_misplaced(tmp_path: Path) -> None:
     assert "TrajectoryPlannerROS" in found.text
 
 
+BEFORE_HYDRO = """observation_sources: front rear
+obstacle_range: 2.5
+robot_radius: 0.3
+inflation_radius: 0.6
+front: {{sensor_frame: laser, data_type: LaserScan, topic: scan, marking: true, clearing: true, {}: 0.5}}
+rear: {{data_type: LaserScan, topic: rear, marking: true, clearing: true, expected_update_rate: 0.4}}
+"""
+
+
+def test_sources_that_a_costmap_itself_names_are_read_by_its_obstacle_layer(tmp_path: Path) -> None:
+    assert findings(tmp_path, "costmap_common.yaml", BEFORE_HYDRO.format("observation_persistence")) == ()
+    (found,) = findings(tmp_path, "costmap_common.yaml", BEFORE_HYDRO.format("observation_persistance"))
+    assert (found.line, found.rule, found.hint) == (5, "unknown-key", "Did you mean observation_persistence?")
+    assert "observation_persistance is not a parameter of ObstacleLayer" in found.text
+
+
 COSTMAP = """local_costmap:
   local_costmap:
     ros__parameters:
