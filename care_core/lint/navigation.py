@@ -6,19 +6,18 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from difflib import get_close_matches
 
 from care_core.errors import UsageError, nearest
 from care_core.lint import contradictions, plugins, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.rules import LEFTOVERS, MEANT, ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED, Leftover
+from care_core.lint.rules import ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED
 from care_core.lint.scopes import COSTMAP, Place, Scoped, class_of, costmaps, scoped, split
+from care_core.lint.unread import unread
 from care_core.metadata import navigation
 from care_core.metadata.fact import Fact
 from care_core.metadata.navigation import DISTRIBUTIONS, STACKS
 
-_ALIKE = 0.8
 _PLACEHOLDER = re.compile(r"\$\(|\$\{|<.*>|[A-Z][A-Z0-9_]*$|.*\{.*\}")
 """A text that a launch file replaces before the node reads it."""
 _ANGLE_TOLERANCE = re.compile(r"(yaw_goal_tolerance|angular_dist_threshold|rotate_to_heading_min_angle)$")
@@ -92,7 +91,7 @@ def _place(
     if not place.owners:
         return
     if not facts:
-        problem = _unknown(file, result, place, likely)
+        problem = unread(file, result, place, likely, is_told=is_told)
         if problem is not None:
             yield problem
         return
@@ -108,76 +107,12 @@ def _place(
     yield from _value(file, place.entry, now or facts, ros)
 
 
-def _unknown(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str]) -> Problem | None:
-    """A name that its reader does not read."""
-    owner = place.owners[0]
-    leftover = next((one for one in LEFTOVERS if one.owner in place.owners and one.name == place.name), None)
-    if leftover is not None and (leftover.reads or str(place.entry.value) == leftover.default):
-        return _leftover(file, place, leftover)
-    own = [name for one in place.owners for name in navigation.keys_of(result.ros, one)]
-    last = place.name.rpartition(".")[2]
-    if result.ros == "ros1" and _is_searched(result, place):
-        return None
-    meant = MEANT.get((owner, place.name)) or next(
-        iter(get_close_matches(last, [name.rpartition(".")[2] for name in own], n=1, cutoff=_ALIKE)), ""
-    )
-    elsewhere = _readers(result, place, likely)
-    hint = f"Did you mean {meant}?" if meant else "Is it of another plugin, or of another release?"
-    if elsewhere and (owner, place.name) not in MEANT:
-        text = f"{owner} does not read {place.name}; {', '.join(elsewhere[:3])} would."
-        hint = "Move it there, or leave it out."
-        return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
-    text = f"{place.name} is not a parameter of {owner} in any release from {' to '.join(_ends(result))}."
-    return problem_at("unknown-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
-
-
-def _readers(result: Scoped, place: Place, likely: frozenset[str]) -> list[str]:
-    """Who else reads a name: those that the file configures first, then those of its release."""
-    found = [one for one in navigation.readers(result.ros, place.name) if one not in place.owners]
-    held = {owner for one in result.places for owner in one.owners}
-    facts = {one: navigation.known(result.ros, one, place.name) for one in found}
-    is_now = {
-        one: any(navigation.distributions(fact, result.ros) & likely for fact in several)
-        for one, several in facts.items()
-    }
-    return sorted(found, key=lambda one: (one not in held, not is_now[one]))
-
-
-def _leftover(file: ConfigFile, place: Place, leftover: Leftover) -> Problem | None:
-    """A name that Nav2's own files hold as well: wrong only where what counts is another value."""
-    values = {split(entry): entry for entry in file.entries}
-    parts = [
-        keys[:-1] for keys, one in values.items() if keys[-1] == "plugin" and class_of(str(one.value)) in leftover.reads
-    ]
-    held = {part: str(one.value) if (one := values.get((*part, leftover.name))) else leftover.default for part in parts}
-    value = str(place.entry.value)
-    part, other = next(((part, one) for part, one in held.items() if one != value), ((), leftover.default))
-    if value == other or (parts and not part):
-        return None
-    name = part[-1] if part else "a goal checker"
-    text = f"{place.owners[0]} does not read {place.name}: that is for {name}, where it is {other}."
-    hint = f"Write {place.name}: {value} under {name}, or leave it out."
-    return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, leftover.source)
-
-
 def _is_spare(file: ConfigFile, entry: Entry) -> bool:
     """Whether a layer that nothing loads is a map's in the local costmap, as Nav2's own files have it since humble."""
     keys = split(entry)
     values = {key[-1]: one.value for one in file.entries if (key := split(one))[:-1] == keys[:-1]}
     is_map = class_of(str(values.pop("plugin", ""))) == "StaticLayer"
     return is_map and _LOCAL in keys and values in ({}, {"map_subscribe_transient_local": "true"})
-
-
-def _ends(result: Scoped) -> tuple[str, str]:
-    names = DISTRIBUTIONS[result.ros]
-    return names[0], names[-1]
-
-
-def _is_searched(result: Scoped, place: Place) -> bool:
-    """Whether ROS 1 looks for a name in the namespaces above the one that needs it (searchParam)."""
-    searched = {"obstacle_range", "raytrace_range", "controller_frequency", "footprint", "robot_radius",
-                "footprint_topic", "published_footprint_topic"}  # fmt: skip
-    return place.name in searched
 
 
 def _other_distribution(

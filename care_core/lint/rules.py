@@ -112,5 +112,11 @@ MEANT: dict[tuple[str, str], str] = {
     ("TrajectoryPlannerROS", "vth_samples"): "vtheta_samples",
     ("behavior_server", "transform_timeout"): "transform_tolerance",
     ("move_base", "recovery_behaviour_enabled"): "recovery_behavior_enabled",
+    ("controller_server", "plugins"): "controller_plugins",
+    ("planner_server", "plugins"): "planner_plugins",
+    ("behavior_server", "plugins"): "behavior_plugins",
+    ("smoother_server", "plugins"): "smoother_plugins",
+    ("velocity_smoother", "max_vel"): "max_velocity",
+    ("velocity_smoother", "min_vel"): "min_velocity",
 }
 """Names that nobody reads, and the one that is meant, where the spelling alone does not tell."""

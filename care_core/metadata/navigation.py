@@ -71,6 +71,11 @@ def readers(ros: Ros, name: str) -> tuple[str, ...]:
     return tuple(owner for owner, facts in _by_owner(ros).items() if name in facts)
 
 
+def node_of(ros: Ros, owner: str) -> str:
+    """The node that a plugin is of; a node is its own."""
+    return _nodes(ros).get(owner, owner)
+
+
 def keys_of(ros: Ros, owner: str) -> Collection[str]:
     """The names that a node or plugin reads, in any distribution."""
     return _by_owner(ros).get(owner, {}).keys()
@@ -141,7 +146,7 @@ def fact_of(ros: Ros, parameter: str, distribution: str = "", owner: str = "") -
     ]
     if owner:
         return named[0] if named else None
-    scored = [(_alike(words, _words([_node_of(fact, ros), fact.owner])), fact) for fact in named]
+    scored = [(_alike(words, _words([node_of(ros, fact.owner), fact.owner])), fact) for fact in named]
     best = max((score for score, _ in scored), default=(0, 0))
     likeliest = [fact for score, fact in scored if score == best and score[0] > 0]
     return likeliest[0] if likeliest and _agree(likeliest) else None
@@ -172,10 +177,6 @@ def _words(texts: Iterable[str]) -> set[str]:
     """Words of names, CamelCase and snake_case alike."""
     split = (re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text).casefold() for text in texts)
     return {word.removesuffix("s") for text in split for word in _WORD.findall(text)} - _COMMON
-
-
-def _node_of(fact: Fact, ros: Ros) -> str:
-    return _nodes(ros).get(fact.owner, fact.owner)
 
 
 @cache

@@ -360,3 +360,54 @@ def test_the_step_that_is_proposed_is_long_enough(tmp_path: Path, rate: float) -
     (problem,) = findings(tmp_path, node("controller_server", *lines, "  model_dt: 0.01"))
     proposed = problem.hint.removeprefix("Make it ").rstrip(".")
     assert findings(tmp_path, node("controller_server", *lines, f"  model_dt: {proposed}")) == ()
+
+
+@pytest.mark.parametrize(
+    ("lines", "key", "rule", "hint"),
+    [
+        (("vx_min: -0.2", "vy_min: 0.0"), "vy_min", "unknown-key", "Check its spelling, or leave it out."),
+        (("vy_std: 0.2", "v_std: 0.2"), "v_std", "unknown-key", "Check its spelling, or leave it out."),
+        (("vy_sdt: 0.2",), "vy_sdt", "unknown-key", "Did you mean vy_std?"),
+        (("vy_std: 0.2", "vy_sdt: 0.2"), "vy_sdt", "unknown-key", "Check its spelling, or leave it out."),
+        (("max_vel_x: 0.5",), "max_vel_x", "misplaced-key", "Leave it out here."),
+    ],
+)
+def test_what_is_proposed_for_an_unknown_name_is_free_and_means_the_same(
+    tmp_path: Path, lines: tuple[str, ...], key: str, rule: str, hint: str
+) -> None:
+    (found,) = findings(tmp_path, controller(MPPI, *lines))
+    assert (found.rule, found.parameter.rpartition("/")[2], found.hint) == (rule, key, hint)
+
+
+@pytest.mark.parametrize(
+    ("text", "rule", "hint"),
+    [
+        (controller(DWB, "max_vel_theta: 1.0", "min_vel_theta: -1.0"), "unknown-key",
+         "Check its spelling, or leave it out."),
+        (controller(DWB, "min_vel_theta: -1.0"), "unknown-key", "Check its spelling, or leave it out."),
+        (node("controller_server", "controller_plugin_types: [a]", "controller_plugins: [b]"), "unknown-key",
+         "Check its spelling, or leave it out."),
+        (node("velocity_smoother", "max_vel: [0.5, 0.0, 1.0]"), "unknown-key", "Did you mean max_velocity?"),
+        (node("velocity_smoother", "max_vel: [0.5, 0.0, 1.0]", "max_velocity: [0.5, 0.0, 1.0]"), "unknown-key",
+         "Leave it out."),
+        (node("planner_server", "plugins: [GridBased]"), "unknown-key", "Did you mean planner_plugins?"),
+        (node("behavior_server", "behavior_plugins: [spin]", "spin:", "  plugin: nav2_behaviors::Spin",
+              "  timeout: 30.0"), "unknown-key", "Leave it out."),
+        (costmap("transform_timeout: 1.0"), "unknown-key", "Check its spelling, or leave it out."),
+    ],
+)  # fmt: skip
+def test_a_name_that_others_have_by_chance_is_not_moved(tmp_path: Path, text: str, rule: str, hint: str) -> None:
+    (found,) = findings(tmp_path, text)
+    assert (found.rule, found.hint) == (rule, hint)
+
+
+DIRECT = ("controller_plugins: [FollowPath]", "sim_time: 1.7", "FollowPath:", f"  plugin: {DWB}")
+
+
+def test_a_value_is_moved_only_to_a_part_that_lacks_it(tmp_path: Path) -> None:
+    (found,) = findings(tmp_path, node("controller_server", *DIRECT, "  vx_samples: 20"))
+    assert found.text == "controller_server does not read sim_time; DWBLocalPlanner would."
+    assert found.hint == "Move it there, or leave it out."
+    (found,) = findings(tmp_path, node("controller_server", *DIRECT, "  sim_time: 1.7"))
+    assert found.text == "controller_server does not read sim_time, which is for DWBLocalPlanner."
+    assert found.hint == "Leave it out here."

@@ -1,0 +1,176 @@
+"""Names that their reader does not read: what is meant by them, and who else would read them.
+
+Nothing is proposed that is set at that place already, or that means something else by its own words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from difflib import SequenceMatcher
+
+from care_core.lint.generic import problem_at
+from care_core.lint.problems import ConfigFile, Problem, Severity
+from care_core.lint.rules import LEFTOVERS, MEANT, Leftover
+from care_core.lint.scopes import Place, Scoped, class_of, split
+from care_core.metadata import navigation
+from care_core.metadata.navigation import DISTRIBUTIONS, STACKS
+
+_ALIKE = 0.8
+"""Least likeness of a name to the one that is meant, of difflib."""
+_FEW = 3
+"""A name that more plugins beside each other read is one that any has, and tells none of them."""
+_CLEAR = 2
+"""Most readers of another node by which a name is known to be theirs."""
+_SEARCHED = frozenset({
+    "obstacle_range", "raytrace_range", "controller_frequency", "footprint", "robot_radius", "footprint_topic",
+    "published_footprint_topic",
+})  # fmt: skip
+"""Names that ROS 1 looks for in the namespaces above the one that needs it (searchParam)."""
+
+
+def unread(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], *, is_told: bool) -> Problem | None:
+    """A name that its reader reads in no release.
+
+    Args:
+        likely: the distributions that the file may be for.
+        is_told: whether somebody says so, and it is no guess.
+    """
+    owner = place.owners[0]
+    leftover = next((one for one in LEFTOVERS if one.owner in place.owners and one.name == place.name), None)
+    if leftover is not None and (leftover.reads or str(place.entry.value) == leftover.default):
+        return _leftover(file, place, leftover)
+    if result.ros == "ros1" and place.name in _SEARCHED:
+        return None
+    others = _others(result, place, likely)
+    misplaced = None if (owner, place.name) in MEANT else _misplaced(file, result, place, others)
+    if misplaced is not None:
+        return misplaced
+    meant = _meant(result, place, likely if is_told else frozenset())
+    first, *_, last = DISTRIBUTIONS[result.ros]
+    text = f"{place.name} is not a parameter of {owner} in any release from {first} to {last}."
+    hint = f"Did you mean {meant}?" if meant else "Leave it out." if others else "Check its spelling, or leave it out."
+    return problem_at("unknown-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
+
+
+# What is meant
+
+
+def _meant(result: Scoped, place: Place, likely: frozenset[str]) -> str:
+    """The name of the same reader that is spelled nearly so, empty where that is set already or nothing tells."""
+    part, dot, last = place.name.rpartition(".")
+    taken = {one.name for one in result.places if one.scope == place.scope}
+    named = MEANT.get((place.owners[0], place.name))
+    if named is not None:
+        return "" if f"{part}{dot}{named}" in taken else named
+    own = [
+        name.rpartition(".")[2]
+        for owner in place.owners
+        for name in navigation.keys_of(result.ros, owner)
+        if name.startswith("<") == bool(dot) and _is_read(result, owner, name, likely)
+    ]
+    nearest = _nearest(last, own)
+    return "" if f"{part}{dot}{nearest}" in taken else nearest
+
+
+def _nearest(name: str, own: Sequence[str]) -> str:
+    """The one name that is spelled most alike; empty where two are, or none means the same."""
+    words = {word for one in own for word in one.split("_")}
+    alike = {
+        one: SequenceMatcher(None, one.casefold(), name.casefold()).ratio()
+        for one in own
+        if not _differs(name, one, words)
+    }
+    most = max(alike.values(), default=0.0)
+    nearest = [one for one, ratio in alike.items() if ratio == most]
+    return nearest[0] if most >= _ALIKE and len(nearest) == 1 else ""
+
+
+def _is_read(result: Scoped, owner: str, name: str, likely: frozenset[str]) -> bool:
+    """Whether a distribution that the file may be for reads a name; any, where nothing tells which these are."""
+    facts = navigation.known(result.ros, owner, name)
+    return not likely or any(navigation.distributions(fact, result.ros) & likely for fact in facts)
+
+
+def _differs(name: str, other: str, words: Iterable[str]) -> bool:
+    """Whether two names that look alike mean two things: `min_vel` and `max_vel`, `timeout` and `first_timeout`."""
+    if other.endswith(f"_{name}"):
+        return True
+    pairs = list(zip(name.split("_"), other.split("_"), strict=False))
+    apart = [(one, two) for one, two in pairs if one != two]
+    if name.count("_") != other.count("_") or len(apart) != 1:
+        return False
+    (one, two) = apart[0]
+    return {one, two} <= set(words) and not one.startswith(two) and not two.startswith(one)
+
+
+# Who else reads it
+
+
+def _others(result: Scoped, place: Place, likely: frozenset[str]) -> list[str]:
+    """Who else reads a name: those of the file's distributions, else those of any."""
+    found = [one for one in navigation.readers(result.ros, place.name) if one not in place.owners]
+    return [one for one in found if _is_read(result, one, place.name, likely)] or found
+
+
+def _misplaced(file: ConfigFile, result: Scoped, place: Place, others: Sequence[str]) -> Problem | None:
+    """A name that others read and that is plainly theirs."""
+    text = f"{place.owners[0]} does not read {place.name}"
+    if targets := _targets(result, place, others):
+        text, hint = f"{text}; {', '.join(targets)} would.", "Move it there, or leave it out."
+    elif owners := _of_whom(result, place, others):
+        text, hint = f"{text}, which is for {', '.join(owners)}.", "Leave it out here."
+    else:
+        return None
+    return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
+
+
+def _targets(result: Scoped, place: Place, others: Sequence[str]) -> list[str]:
+    """Parts of this file to which a value may be moved: those that read its name and have no value of it.
+
+    A plugin's value may be any plugin's where many of its node read the name, and another node's by chance.
+    """
+    beside, near = _near(result, place, others)
+    is_plugin = navigation.node_of(result.ros, place.owners[0]) != place.owners[0]
+    if (len(beside) > _FEW and is_plugin) or (not beside and len(others) > _CLEAR):
+        return []
+    lacking = [one for one in (near if beside else others) if _lacks(result, one, place.name)]
+    return lacking if len(lacking) <= _CLEAR else []
+
+
+def _of_whom(result: Scoped, place: Place, others: Sequence[str]) -> Sequence[str]:
+    """Whose name it is, where few read it: plugins of the same node, or the one reader in files of ROS 1, which are
+    loaded together."""
+    beside, near = _near(result, place, others)
+    owners = near or beside or (others if result.ros == "ros1" and len(others) == 1 else [])
+    return owners if len(owners) <= _FEW else []
+
+
+def _near(result: Scoped, place: Place, others: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Those that belong to the same node, and of these the ones that the file configures."""
+    node = navigation.node_of(result.ros, place.owners[0])
+    beside = [one for one in others if navigation.node_of(result.ros, one) == node]
+    held = {owner for one in result.places for owner in one.owners}
+    return beside, [one for one in beside if one in held]
+
+
+def _lacks(result: Scoped, owner: str, name: str) -> bool:
+    """Whether a part of the file that has this reader has no value of that name."""
+    parts = [one for one in result.places if owner in one.owners]
+    return bool({one.scope for one in parts} - {one.scope for one in parts if one.name == name})
+
+
+def _leftover(file: ConfigFile, place: Place, leftover: Leftover) -> Problem | None:
+    """A name that Nav2's own files hold as well: wrong only where what counts is another value."""
+    values = {split(entry): entry for entry in file.entries}
+    parts = [
+        keys[:-1] for keys, one in values.items() if keys[-1] == "plugin" and class_of(str(one.value)) in leftover.reads
+    ]
+    held = {part: str(one.value) if (one := values.get((*part, leftover.name))) else leftover.default for part in parts}
+    value = str(place.entry.value)
+    part, other = next(((part, one) for part, one in held.items() if one != value), ((), leftover.default))
+    if value == other or (parts and not part):
+        return None
+    name = part[-1] if part else "a goal checker"
+    text = f"{place.owners[0]} does not read {place.name}: that is for {name}, where it is {other}."
+    hint = f"Write {place.name}: {value} under {name}, or leave it out."
+    return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, leftover.source)
