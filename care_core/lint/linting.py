@@ -60,7 +60,7 @@ def _lint(name: str, target: str, schema: Schema | None) -> Linted:
     problems = [*refused, *generic.check(file), *_of_ecosystem(file, target)]
     if schema is not None:
         problems += _of_profile(file, schema)
-    order = sorted(set(problems), key=lambda one: (one.line, one.column, one.rule))
+    order = sorted(set(problems), key=lambda one: (one.line, one.column, one.rule, one.text))
     return Linted(file, tuple(order))
 
 

@@ -11,7 +11,7 @@ from care_core.errors import UsageError, nearest
 from care_core.lint import contradictions, plugins, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.rules import ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED
+from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED
 from care_core.lint.scopes import COSTMAP, Place, Scoped, class_of, costmaps, scoped, split
 from care_core.lint.unread import unread
 from care_core.metadata import navigation
@@ -48,9 +48,10 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of ROS parameters."""
     result = scoped(file)
     distribution = distribution_of(target, result.ros)
-    likely = frozenset({distribution}) if distribution else _likely(result)
+    shown = plugins.shown(file) if result.ros == "ros2" else frozenset()
+    likely = frozenset({distribution}) if distribution else _likely(result, shown)
     for place in result.places:
-        yield from _place(file, result, place, likely, is_told=bool(distribution))
+        yield from _place(file, result, place, likely, is_told=bool(distribution), is_shown=bool(shown))
     for entry, key in result.not_loaded:
         name = split(entry)[-2]
         if _is_spare(file, entry):
@@ -70,8 +71,8 @@ def values(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
     yield from workable.check(file, result)
 
 
-def _likely(result: Scoped) -> frozenset[str]:
-    """The distributions that know most of a file's names."""
+def _likely(result: Scoped, shown: frozenset[str]) -> frozenset[str]:
+    """The distributions that know most of a file's names, of those that its plugins show where they show any."""
     counts: Counter[str] = Counter()
     for place in result.places:
         for owner in place.owners:
@@ -79,12 +80,13 @@ def _likely(result: Scoped) -> frozenset[str]:
             if facts:
                 counts.update({name for fact in facts for name in navigation.distributions(fact, result.ros)})
                 break
+    counts = Counter({name: count for name, count in counts.items() if not shown or name in shown})
     most = max(counts.values(), default=0)
-    return frozenset(name for name, count in counts.items() if count == most)
+    return frozenset(name for name, count in counts.items() if count == most) or shown
 
 
 def _place(
-    file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], *, is_told: bool
+    file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], *, is_told: bool, is_shown: bool
 ) -> Iterator[Problem]:
     ros = result.ros
     facts = [fact for owner in place.owners for fact in navigation.known(ros, owner, place.name)]
@@ -100,6 +102,8 @@ def _place(
         problem = _other_distribution(file, result, place, facts, likely, is_told=is_told)
         if problem is not None:
             yield problem
+        if is_told or is_shown:
+            return
     dead = _dead(result, place)
     if dead:
         yield problem_at("dead-key", Severity.WARNING, file, place.entry, *dead, _COSTMAP_SOURCE)
@@ -182,7 +186,8 @@ def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact], ros: str) -> I
         refused = "the node will not start" if ros == "ros2" else "the default is used instead"
         text = f"{entry.keys[-1]} is {_a(entry.kind)}, declared is {_a(' or '.join(sorted(types)))}: {refused}."
         severity = Severity.ERROR if ros == "ros2" else Severity.WARNING
-        yield problem_at("wrong-type", severity, file, entry, text, _as_type(entry, types), fact.source)
+        hint = _rescaled(fact, entry, types) or _as_type(entry, types)
+        yield problem_at("wrong-type", severity, file, entry, text, hint, fact.source)
         return
     number = entry.number
     if number is None:
@@ -233,6 +238,19 @@ def _as_type(entry: Entry, types: set[str]) -> str:
         return f"Write {number:.0f}."
     if number in (0.0, 1.0) and types == {"bool"}:
         return f"Write {'true' if number else 'false'}."
+    return ""
+
+
+def _rescaled(fact: Fact, entry: Entry, types: set[str]) -> str:
+    """What to write for a value in the unit of another release."""
+    one = next((one for one in RESCALED if (one.owner, one.name) == (fact.owner, fact.name)), None)
+    number = entry.number
+    if one is None or number is None or number <= 0:
+        return ""
+    if types == {"float"} and number >= one.between:
+        return f"It is in {one.new} since {one.since}, in {one.old} before: write {float(number / one.ratio)}."
+    if types == {"int"} and number < one.between:
+        return f"It is in {one.old} before {one.since}, in {one.new} since: write {number * one.ratio:.0f}."
     return ""
 
 

@@ -32,9 +32,20 @@ def check(file: ConfigFile, distribution: str) -> Iterator[Problem]:
         distribution: what the file is for; empty where nobody says so.
     """
     values = {split(entry): entry for entry in file.entries}
-    named = [entry for keys, entry in values.items() if PARAMETERS in keys and keys[-1] in _NAMING]
-    yield from _names(file, named, distribution)
+    yield from _names(file, _named(values), distribution)
     yield from _critics(file, values)
+
+
+def shown(file: ConfigFile) -> frozenset[str]:
+    """The releases that load every plugin of a file that any release loads; empty where the file names none, or none
+    loads all of them."""
+    releases = [plugins.releases_of(str(one.value)) for one in _named({split(one): one for one in file.entries})]
+    known = [one for one in releases if one]
+    return frozenset.intersection(*known) if known else frozenset()
+
+
+def _named(values: Mapping[Keys, Entry]) -> list[Entry]:
+    return [entry for keys, entry in values.items() if PARAMETERS in keys and keys[-1] in _NAMING]
 
 
 def _names(file: ConfigFile, named: list[Entry], distribution: str) -> Iterator[Problem]:

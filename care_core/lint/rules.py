@@ -79,6 +79,27 @@ ROS2_NODES_RENAMED: tuple[tuple[str, str, str], ...] = (("recoveries_server", "b
 """Nodes: the old name, the new one, and the distribution that has it."""
 
 
+class Rescaled(NamedTuple):
+    """A parameter that has another unit and type since a distribution."""
+
+    owner: str
+    name: str
+    since: str
+    ratio: float
+    """How many of the old unit make one of the new."""
+    old: str
+    new: str
+    """The units, in words."""
+    between: float
+    """Values from this on are meant in the old unit, those below in the new one."""
+
+
+RESCALED: tuple[Rescaled, ...] = (
+    Rescaled("map_saver", "save_map_timeout", "galactic", 1000.0, "milliseconds", "seconds", 100.0),
+)
+"""map_saver.cpp of foxy declares 2000 and counts milliseconds, that of galactic 2.0 and counts seconds."""
+
+
 class Leftover(NamedTuple):
     """A name that files of Nav2 itself hold and nothing reads: with the value that counts anyway it misleads nobody."""
 

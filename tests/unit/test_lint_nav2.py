@@ -411,3 +411,35 @@ def test_a_value_is_moved_only_to_a_part_that_lacks_it(tmp_path: Path) -> None:
     (found,) = findings(tmp_path, node("controller_server", *DIRECT, "  sim_time: 1.7"))
     assert found.text == "controller_server does not read sim_time, which is for DWBLocalPlanner."
     assert found.hint == "Leave it out here."
+
+
+@pytest.mark.parametrize(
+    ("value", "target", "hint"),
+    [
+        ("5000", "", "It is in seconds since galactic, in milliseconds before: write 5.0."),
+        ("5", "humble", "Write 5.0."),
+        ("5.0", "foxy", "It is in milliseconds before galactic, in seconds since: write 5000."),
+        ("5.0", "humble", ""),
+        ("5000", "foxy", ""),
+    ],
+)
+def test_a_value_in_the_unit_of_another_release_is_converted(
+    tmp_path: Path, value: str, target: str, hint: str
+) -> None:
+    shown = planner("nav2_smac_planner/SmacPlannerHybrid") if not target else ""
+    text = node("map_saver", f"save_map_timeout: {value}") + shown
+    found = findings(tmp_path, text, target)
+    assert [(one.rule, one.hint) for one in found] == ([("wrong-type", hint)] if hint else [])
+
+
+@pytest.mark.parametrize(
+    ("separator", "target", "rules"),
+    [("/", "humble", ["unknown-key"]), ("/", "", []), ("::", "", ["wrong-type"]), ("::", "jazzy", ["wrong-type"])],
+)
+def test_a_value_is_judged_only_where_the_release_reads_it(
+    tmp_path: Path, separator: str, target: str, rules: list[str]
+) -> None:
+    smac = ("GridBased:", f"  plugin: nav2_smac_planner{separator}SmacPlannerHybrid",
+            "  analytic_expansion_max_cost: true")  # fmt: skip
+    found = findings(tmp_path, node("planner_server", "planner_plugins: [GridBased]", *smac), target)
+    assert [one.rule for one in found] == rules
