@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.readers import COLLISIONS
 from care_core.lint.scopes import Keys, class_of, split, words_of
 from care_core.metadata import plugins
 from care_core.metadata.navigation import spans
@@ -16,9 +17,16 @@ from care_core.metadata.navigation import spans
 _NAMING = ("plugin", "primary_controller")
 """Keys whose value is the name of a plugin."""
 _ALIKE = 0.85
-_CONTROLLERS = {"DWBLocalPlanner": plugins.DWB_CRITICS, "MPPIController": plugins.MPPI_CRITICS}
+_DWB = "DWBLocalPlanner"
+_CONTROLLERS = {_DWB: plugins.DWB_CRITICS, "MPPIController": plugins.MPPI_CRITICS}
 """Controllers that weigh trajectories by critics, and of which kind these are."""
 _WITHOUT = ("RegulatedPurePursuitController", "GracefulController")
+_LOOKING = {_DWB: ("BaseObstacleCritic", "ObstacleFootprintCritic"), "MPPIController": COLLISIONS}
+"""Their critics that hold trajectories against the obstacles of the costmap."""
+_BLIND = {
+    _DWB: "base_obstacle.cpp and obstacle_footprint.cpp alone refuse obstacles; map_grid.cpp leads over them",
+    "MPPIController": "cost_critic.cpp and obstacles_critic.cpp alone weigh what a trajectory runs over",
+}
 _LOADS = {
     "DWBLocalPlanner": "dwb_local_planner.cpp looks for critics in dwb_critics, with Critic added to their name",
     "MPPIController": "critic_manager.cpp looks for critics in mppi::critics alone",
@@ -118,6 +126,7 @@ def _critics(file: ConfigFile, values: Mapping[Keys, Entry]) -> Iterator[Problem
         owner = class_of(str((handed or entry).value))
         if owner in _CONTROLLERS:
             yield from _listed(file, values, here, owner)
+            yield from _blind(file, values, here, owner)
         if owner in _CONTROLLERS or owner in _WITHOUT:
             yield from _parts(file, values, here, owner)
 
@@ -133,6 +142,38 @@ def _listed(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: s
             text = f"{name} is a critic of {other}, not of {owner}: the controller does not load."
             hint = f"Leave it out, or load {other}."
             yield problem_at("plugin-name", Severity.ERROR, file, entry, text, hint, _LOADS[owner])
+
+
+def _blind(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
+    """Controllers none of whose critics looks at obstacles. Nothing is said of lists with critics of other packages."""
+    entry = values.get((*here, "critics"))
+    listed = words_of(entry)
+    known = {name: _class_of_critic(values, here, owner, name) for name in listed}
+    if entry is None or not listed or not all(known.values()):
+        return
+    looking = [name for name in listed if known[name] in _LOOKING[owner]]
+    off = [one for name in looking for one in [_switched_off(values, here, owner, name)] if one is not None]
+    if len(off) < len(looking):
+        return
+    text = f"No critic of {owner} looks at obstacles: its trajectories lead through them."
+    plain = [name.removesuffix("Critic") if owner == _DWB else name for name in _LOOKING[owner]]
+    hint = f"Switch {looking[0]} on." if looking else f"Add {' or '.join(plain)} to the list."
+    at = off[0] if off else entry
+    yield problem_at("hinders", Severity.WARNING, file, at, text, hint, _BLIND[owner], (entry.name,) if off else ())
+
+
+def _class_of_critic(values: Mapping[Keys, Entry], here: Keys, owner: str, name: str) -> str:
+    """The class of a critic that comes with Nav2, empty for another."""
+    given = values.get((*here, name, "class"))
+    plain = name if given is None or owner != _DWB else class_of(str(given.value))
+    full = plain if owner != _DWB or "Critic" in plain else f"{plain}Critic"
+    return full if full in plugins.classes(_CONTROLLERS[owner]) else ""
+
+
+def _switched_off(values: Mapping[Keys, Entry], here: Keys, owner: str, name: str) -> Entry | None:
+    """What keeps a critic from counting: a scale of 0 of DWB's, `enabled` of MPPI's."""
+    entry = values.get((*here, name, "scale" if owner == _DWB else "enabled"))
+    return entry if entry is not None and (entry.number == 0 if owner == _DWB else entry.value == "false") else None
 
 
 def _parts(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:

@@ -3,33 +3,33 @@ several readers beside each other."""
 
 from __future__ import annotations
 
-import ast
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from itertools import combinations
 from typing import NamedTuple
 
+from care_core.lint import layers, smoother, window
 from care_core.lint.contradictions import inscribed_radius
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.scopes import COSTMAP, Keys, Scoped, words_of
-from care_core.records import Struct, field
+from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.readers import (
+    CHECKERS,
+    COLLISIONS,
+    CONTROLLERS,
+    INFLATIONS,
+    OBSTACLES,
+    PLANNERS,
+    PROGRESS,
+    SAMPLED,
+    TOP_SPEEDS,
+    Reader,
+    Readers,
+    readers,
+    warning,
+)
+from care_core.lint.scopes import COSTMAP, Scoped, words_of
 
-PLANNERS = ("DWAPlannerROS", "TrajectoryPlannerROS", "TebLocalPlannerROS")
-CONTROLLERS = ("DWBLocalPlanner", "MPPIController", "RegulatedPurePursuitController", "GracefulController")
-CHECKERS = ("SimpleGoalChecker", "StoppedGoalChecker", "PositionGoalChecker")
-PROGRESS = ("SimpleProgressChecker", "PoseProgressChecker")
-OBSTACLES = ("ObstacleLayer", "VoxelLayer")
-INFLATIONS = ("InflationLayer", "LegacyInflationLayer", "AsymmetricInflationLayer")
-SAMPLED = ("DWAPlannerROS", "TrajectoryPlannerROS", "DWBLocalPlanner")
-"""Planners that try speeds out, over a time ahead."""
 _SAME_S = 1e-6
 """Periods that are so near count as one (optimizer.cpp)."""
-_CRITICS = ("CostCritic", "ObstaclesCritic")
-"""MPPI's, that may hold a footprint against the costmap."""
-TOP_SPEEDS = ("max_vel_x", "vx_max", "desired_linear_vel", "max_linear_vel", "v_linear_max")
-_RANGES = {"obstacle_max_range": 2.5, "raytrace_max_range": 3.0}
-"""What a source of Nav2's obstacle layers has where nothing is written, m (obstacle_layer.cpp)."""
 _OTHER_ROBOT = 1.5
 """How far apart the sizes of one robot in two costmaps are never meant to be: padding makes a few percent."""
 
@@ -137,68 +137,6 @@ OFF: tuple[Off, ...] = (
 )  # fmt: skip
 
 
-class Reader(Struct, eq=False):
-    """A node or plugin with the values that it reads, by its own names for them."""
-
-    owners: tuple[str, ...]
-    scope: Keys
-    values: dict[str, Entry] = field(default_factory=dict)
-
-    def number(self, name: str) -> float | None:
-        entry = self.values.get(name)
-        return None if entry is None else entry.number
-
-    def first(self, names: Iterable[str]) -> Entry | None:
-        """The first of these that has a number."""
-        held = (self.values[name] for name in names if name in self.values)
-        return next((one for one in held if one.number is not None), None)
-
-    def is_off(self, name: str) -> bool:
-        return name in self.values and self.values[name].value == "false"
-
-    def is_on(self, name: str) -> bool:
-        return name in self.values and self.values[name].value == "true"
-
-    def has_footprint(self) -> bool:
-        """Whether a costmap's robot is drawn, and is not a circle."""
-        return "footprint" in self.values and str(self.values["footprint"].value).strip() not in ("", "[]")
-
-    def own(self, name: str) -> list[Entry]:
-        """A value of its own or of its parts, such as the sources of a layer."""
-        return [entry for key, entry in self.values.items() if key.rpartition(".")[2] == name]
-
-    def is_a(self, *owners: str) -> bool:
-        return bool(self.owners) and all(one in owners for one in self.owners)
-
-
-class Readers(tuple[Reader, ...]):
-    """Every reader of a file."""
-
-    __slots__ = ()
-
-    def of(self, *owners: str) -> list[Reader]:
-        return [one for one in self if one.is_a(*owners)]
-
-    def one(self, owners: Iterable[str], names: Iterable[str]) -> Entry | None:
-        """The only value of these names; None where there is none, or several differ."""
-        found = [entry for one in self.of(*owners) if (entry := one.first(names)) is not None]
-        return found[0] if found and len({entry.number for entry in found}) == 1 else None
-
-    def within(self, scope: Keys) -> list[Reader]:
-        """The readers below a scope."""
-        return [one for one in self if len(one.scope) > len(scope) and one.scope[: len(scope)] == scope]
-
-
-def readers(result: Scoped) -> Readers:
-    """The values of a file by who reads them."""
-    found: dict[tuple[tuple[str, ...], Keys], Reader] = {}
-    for place in result.places:
-        if place.owners:
-            reader = found.setdefault((place.owners, place.scope), Reader(place.owners, place.scope))
-            reader.values[place.name] = place.entry
-    return Readers(found.values())
-
-
 def check(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
     """Values with which a robot cannot do its work, or hardly."""
     held = readers(result)
@@ -220,7 +158,7 @@ def _above(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
                 text = f"{entry.keys[-1]} is {entry.number:g}: {rule.why}."
                 side = {1: "above", -1: "below", 0: "other than"}[rule.sign]
                 hint = f"It must be 0 or {side} it." if rule.zero else f"It must be {side} 0."
-                yield _problem(rule.rule, file, entry, text, hint, rule.source)
+                yield warning(rule.rule, file, entry, text, hint, rule.source)
 
 
 def _is_of_source(key: str) -> bool:
@@ -233,13 +171,7 @@ def _off(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
         if reader.is_a(*rule.owners) and reader.is_off(rule.name):
             entry = reader.values[rule.name]
             text = f"{rule.name} of {reader.owners[0]} is off: {rule.why}."
-            yield _problem(rule.rule, file, entry, text, "Switch it on.", rule.source)
-
-
-def _problem(
-    rule: str, file: ConfigFile, entry: Entry, text: str, hint: str, source: str, others: Sequence[Entry] = ()
-) -> Problem:
-    return problem_at(rule, Severity.WARNING, file, entry, text, hint, source, tuple(one.name for one in others))
+            yield warning(rule.rule, file, entry, text, "Switch it on.", rule.source)
 
 
 # Several values beside each other
@@ -259,7 +191,7 @@ def _simulated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if entry is not None and entry.number and rate is not None and 0 < entry.number * (rate.number or 0) < 1:
             text = f"sim_time ({entry.number:g} s) is shorter than a step of controller_frequency ({rate.number:g} Hz)."
             hint = "The robot drives on past what was tried out: raise the rate or sim_time."
-            yield _problem("contradiction", file, entry, text, hint, "the trajectory generators", [rate])
+            yield warning("contradiction", file, entry, text, hint, "the trajectory generators", [rate])
 
 
 def _predicted(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -274,7 +206,7 @@ def _predicted(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 "MPPI does not start."
             )
             hint = f"Make it {math.ceil(1e4 / hz) / 1e4:g}."
-            yield _problem("cannot-work", file, entry, text, hint, "optimizer.cpp, setOffset", [rate])
+            yield warning("cannot-work", file, entry, text, hint, "optimizer.cpp, setOffset", [rate])
 
 
 def _considered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -282,14 +214,14 @@ def _considered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     local = [one for one in held.of(COSTMAP) if any("local_costmap" in key for key in one.scope)]
     if not local or any(one.has_footprint() for one in local):
         return
-    for reader in held.of("MPPIController", *_CRITICS):
+    for reader in held.of("MPPIController", *COLLISIONS):
         for switch in reader.own("consider_footprint"):
             if switch.value == "true":
                 text = (
                     f"{'.'.join(switch.keys[-2:])} is on, and the local costmap has no footprint: MPPI does not start."
                 )
                 hint = "Give the costmap a footprint, or switch it off."
-                yield _problem("cannot-work", file, switch, text, hint, "cost_critic.cpp, obstacles_critic.cpp")
+                yield warning("cannot-work", file, switch, text, hint, "cost_critic.cpp, obstacles_critic.cpp")
 
 
 def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -307,7 +239,7 @@ def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 f"({step:.2g} rad: {slowest.keys[-1]} {slowest.number:g} at {rate.number:g} Hz)."
             )
             source = "latched_stop_rotate_controller.cpp turns no slower"
-            yield _problem("contradiction", file, entry, text, "The robot turns to and fro.", source, [slowest, rate])
+            yield warning("contradiction", file, entry, text, "The robot turns to and fro.", source, [slowest, rate])
 
 
 def _starts(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -327,7 +259,7 @@ def _starts(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             )
             source = "simple_trajectory_generator.cpp: only speeds that a step reaches, and none below both"
             others = [one for one in every if one is not None and one is not ahead]
-            yield _problem("contradiction", file, ahead, text, "Raise them or lower the least speeds.", source, others)
+            yield warning("contradiction", file, ahead, text, "Raise them or lower the least speeds.", source, others)
 
 
 def _progress(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -347,52 +279,7 @@ def _progress(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 f"is {speed:g}: every drive counts as stuck."
             )
             others = [reader.values[way], top]
-            yield _problem("contradiction", file, reader.values[time], text, "Give it more time.", source, others)
-
-
-def _window(file: ConfigFile, held: Readers) -> Iterator[Problem]:
-    """Local costmaps that are too small for the robot, its look-ahead or its trajectories."""
-    for reader in held.of(COSTMAP):
-        if not any("local_costmap" in key for key in reader.scope):
-            continue
-        if reader.is_off("rolling_window"):
-            text = "rolling_window of the local costmap is off: the robot drives out of it."
-            entry = reader.values["rolling_window"]
-            yield _problem("cannot-work", file, entry, text, "Switch it on.", "the window stays where it began")
-        sides = [one for name in ("width", "height") if (one := reader.values.get(name)) is not None and one.number]
-        if not sides:
-            continue
-        side = min(sides, key=lambda one: one.number or 0.0)
-        half = (side.number or 0.0) / 2
-        for reach_m, what, others in _reaches(held, reader):
-            if reach_m > half > 0:
-                text = f"{side.keys[-1]} of the local costmap ({side.number:g} m) ends before {what} ({reach_m:.3g} m)."
-                source = "what is off the costmap is no valid trajectory (costmap_model.cpp)"
-                yield _problem("hinders", file, side, text, f"Make it more than {2 * reach_m:.3g} m.", source, others)
-
-
-def _reaches(held: Readers, costmap: Reader) -> Iterator[tuple[float, str, list[Entry]]]:
-    """How far ahead of the robot a local costmap has to reach, m, for what."""
-    radius = inscribed_radius(costmap.values.get("footprint"), costmap.values.get("robot_radius"))
-    if radius is not None:
-        yield radius, "the robot itself", []
-    for reader in held.of("RegulatedPurePursuitController"):
-        ahead = reader.first(("lookahead_dist",))
-        if ahead is not None:
-            yield ahead.number or 0.0, "lookahead_dist", [ahead]
-    for reader in held.of(*SAMPLED):
-        top, time = reader.first(("max_vel_trans", "max_speed_xy", "max_vel_x")), reader.values.get("sim_time")
-        if top is not None and time is not None and top.number and time.number:
-            yield top.number * time.number, "where a trajectory of sim_time ends", [top, time]
-    for reader in held.of("MPPIController"):
-        parts = [reader.values.get(name) for name in ("vx_max", "time_steps", "model_dt")]
-        known = [entry for entry in parts if entry is not None and entry.number]
-        if len(known) == len(parts):
-            yield math.prod(entry.number or 0.0 for entry in known), "where a trajectory of time_steps ends", known
-    for layer in held.within(costmap.scope):
-        entry = layer.values.get("inflation_radius") if layer.is_a(*INFLATIONS) else None
-        if entry is not None:
-            yield entry.number or 0.0, "inflation_radius", [entry]
+            yield warning("contradiction", file, reader.values[time], text, "Give it more time.", source, others)
 
 
 def _cells(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -406,17 +293,17 @@ def _cells(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             continue
         if cell.number <= 0:
             text = f"resolution is {cell.number:g}: the costmap has no cells."
-            yield _problem("cannot-work", file, cell, text, "It must be above 0.", "costmap_2d")
+            yield warning("cannot-work", file, cell, text, "It must be above 0.", "costmap_2d")
         elif radius is not None and cell.number > radius > 0:
             text = f"resolution ({cell.number:g} m) is coarser than the robot's inscribed radius ({radius:.3g} m)."
-            yield _problem("hinders", file, cell, text, "Ways through are closed: make cells smaller.", "costmap_2d")
+            yield warning("hinders", file, cell, text, "Ways through are closed: make cells smaller.", "costmap_2d")
     cell = held.one((COSTMAP,), ("resolution",))
     for reader in held.of(*PLANNERS, *CHECKERS):
         entry = reader.values.get("xy_goal_tolerance")
         if cell is not None and cell.number and entry is not None and entry.number and 0 < entry.number < cell.number:
             text = f"xy_goal_tolerance ({entry.number:g} m) is finer than a cell of the costmap ({cell.number:g} m)."
             hint = "The robot circles about its goal: give it more."
-            yield _problem("hinders", file, entry, text, hint, _TOLERANCE, [cell])
+            yield warning("hinders", file, entry, text, hint, _TOLERANCE, [cell])
 
 
 def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -430,7 +317,7 @@ def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         padding = reader.values.get("footprint_padding")
         if radius and padding is not None and padding.number is not None and padding.number > radius:
             text = f"footprint_padding ({padding.number:g} m) is more than the robot itself ({radius:.3g} m)."
-            yield _problem(
+            yield warning(
                 "contradiction", file, padding, text, "It closes narrow ways.", "costmap_2d pads each side by it"
             )
     for one, other in combinations(sized, 2):
@@ -439,47 +326,7 @@ def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             text = f"The robot has an inscribed radius of {large:.3g} m in one costmap and {small:.3g} m in the other."
             others = [pair[1] for pair in (one, other) if pair[1] is not entry]
             source = "both planners have to keep the same robot clear"
-            yield _problem("contradiction", file, entry, text, "Give both the same.", source, others)
-
-
-def _marks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
-    """Costmaps into which nothing puts obstacles, or out of which nothing takes them, and obstacles that stay."""
-    for costmap in held.of(COSTMAP):
-        layers = [one for one in held.within(costmap.scope) if one.is_a(*OBSTACLES)]
-        marking = [one for one in layers if not one.is_off("enabled")]
-        if layers and not marking and any("local_costmap" in key for key in costmap.scope):
-            text = "No layer of the local costmap that marks obstacles is on: the robot drives blind."
-            yield _problem("hinders", file, layers[0].values["enabled"], text, "Switch one on.", "obstacle_layer.cpp")
-        for name, what in (("marking", "puts obstacles into it"), ("clearing", "takes obstacles out of it")):
-            switches = [entry for layer in marking for entry in layer.own(name)]
-            if switches and all(entry.value == "false" for entry in switches):
-                text = f"No source of {costmap.scope[-1] if costmap.scope else 'the costmap'} {what}."
-                hint = f"Switch {name} on for one."
-                yield _problem("hinders", file, switches[0], text, hint, "obstacle_layer.cpp", switches[1:])
-    for reader in held.of(*OBSTACLES, COSTMAP):
-        yield from _uncleared(file, reader)
-
-
-def _uncleared(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
-    """Sources that mark obstacles farther away than they clear."""
-    for short, far in (("raytrace_range", "obstacle_range"), ("raytrace_max_range", "obstacle_max_range")):
-        keys = {key[: -len(last)] for key in reader.values for last in (short, far) if key.endswith(last)}
-        for source in sorted(keys):
-            marked, cleared = reader.values.get(f"{source}{far}"), reader.values.get(f"{source}{short}")
-            one_is_default = marked is None or cleared is None
-            if reader.is_off(f"{source}marking") or reader.is_off(f"{source}clearing"):
-                continue
-            if one_is_default and (short not in _RANGES or not source or not reader.is_on(f"{source}clearing")):
-                continue
-            far_m, short_m = (_RANGES.get(name, 0.0) if one is None else one.number or 0.0
-                              for one, name in ((marked, far), (cleared, short)))  # fmt: skip
-            entry = cleared or marked
-            if entry is not None and 0 < short_m < far_m:
-                said = [" by default" if one is None else "" for one in (marked, cleared)]
-                text = f"{far} ({far_m:g} m{said[0]}) is above {short} ({short_m:g} m{said[1]})."
-                hint = "What is marked beyond is never cleared."
-                others = [marked] if cleared is not None and marked is not None else []
-                yield _problem("contradiction", file, entry, text, hint, "obstacle_layer.cpp", others)
+            yield warning("contradiction", file, entry, text, "Give both the same.", source, others)
 
 
 def _goal_checks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -494,7 +341,7 @@ def _goal_checks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 f"({least:g} m): it stops to turn before it has arrived."
             )
             hint = "Give both the same."
-            yield _problem("contradiction", file, checker, text, hint, "dwb_critics, rotate_to_goal.cpp", [entry])
+            yield warning("contradiction", file, checker, text, hint, "dwb_critics, rotate_to_goal.cpp", [entry])
 
 
 def _unknown_space(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -510,7 +357,7 @@ def _unknown_space(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         entry = planner.values["allow_unknown"]
         text = "allow_unknown is off, and the global costmap has no map: where nothing was seen there is no plan."
         others = [costmap.values["plugins"]]
-        yield _problem("contradiction", file, entry, text, "Allow it.", "the planners keep to known cells", others)
+        yield warning("contradiction", file, entry, text, "Allow it.", "the planners keep to known cells", others)
 
 
 def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -520,72 +367,7 @@ def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         entries = [one for name in names if (one := reader.first((name, name.replace("tance_bias", "t_scale"))))]
         if len(entries) == len(names) and not any(one.number for one in entries):
             text = "goal_distance_bias and path_distance_bias are 0: nothing draws the robot to its goal."
-            yield _problem("cannot-work", file, entries[0], text, "Raise them.", "dwa_planner.cpp", entries[1:])
-
-
-_SMOOTHER = "velocity_smoother.cpp of every release, on_configure"
-_SINCE_IRON = "velocity_smoother.cpp, on_configure, since iron; in humble the command is kept between the two"
-_REFUSED = "the node will not start"
-_FORCED = "the node will not start, and that of humble drives the robot on when it is to stop"
-_VECTORS: Mapping[str, tuple[int, str, str]] = {
-    "max_velocity": (1, _FORCED, _SINCE_IRON), "min_velocity": (-1, _FORCED, _SINCE_IRON),
-    "max_accel": (1, _REFUSED, _SMOOTHER), "max_decel": (-1, _REFUSED, _SMOOTHER),
-    "deadband_velocity": (0, "", ""),
-}  # fmt: skip
-"""Lists of the velocity smoother: the sign of their numbers, what happens with another, and what says so."""
-_AXES = "Give it 3, for x, y and the turn; since lyrical all five lists may have 6."
-
-
-def _smoothed(file: ConfigFile, held: Readers) -> Iterator[Problem]:
-    """A smoother that lets nothing through."""
-    top = held.one(CONTROLLERS, TOP_SPEEDS)
-    for reader in held.of("velocity_smoother"):
-        for name in ("max_velocity", "max_accel"):
-            entry = reader.values.get(name)
-            first = _numbers(entry)[:1]
-            if entry is not None and first and first[0] == 0:
-                text = f"{name} of velocity_smoother begins with 0: the robot never moves."
-                yield _problem("cannot-work", file, entry, text, "It must be above 0.", "velocity_smoother.cpp")
-        entry = reader.values.get("deadband_velocity")
-        first = _numbers(entry)[:1]
-        if entry is not None and top is not None and top.number and first and first[0] >= top.number > 0:
-            text = f"deadband_velocity ({first[0]:g}) swallows every speed up to {top.keys[-1]} ({top.number:g})."
-            yield _problem("contradiction", file, entry, text, "Lower it.", "velocity_smoother.cpp", [top])
-
-
-def _vectors(file: ConfigFile, held: Readers) -> Iterator[Problem]:
-    """Lists of the velocity smoother that it refuses: of another length, or with the wrong sign."""
-    for reader in held.of("velocity_smoother"):
-        lists = {name: one for name in _VECTORS if (one := reader.values.get(name)) is not None and _numbers(one)}
-        sizes = {name: len(_numbers(one)) for name, one in lists.items()}
-        wanted = 6 if len(sizes) == len(_VECTORS) and set(sizes.values()) == {6} else 3
-        for name, entry in lists.items():
-            numbers = _numbers(entry)
-            if len(numbers) != wanted:
-                text = f"{name} has {_count(len(numbers), 'number')}: the node will not start."
-                yield problem_at("cannot-work", Severity.ERROR, file, entry, text, _AXES, _SMOOTHER)
-            sign, why, source = _VECTORS[name]
-            wrong = next((one for one in numbers if one * sign < 0), None)
-            if sign and wrong is not None:
-                side = "above" if sign > 0 else "below"
-                text = f"{name} holds {wrong:g}: {why}."
-                hint = f"Each of its numbers must be 0 or {side} it."
-                yield problem_at("cannot-work", Severity.ERROR, file, entry, text, hint, source)
-
-
-def _count(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
-def _numbers(entry: Entry | None) -> list[float]:
-    """A list of numbers, empty where it is none."""
-    if entry is None or not isinstance(entry.value, str):
-        return []
-    try:
-        held = ast.literal_eval(entry.value.strip())
-        return [float(one) for one in held]
-    except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):
-        return []
+            yield warning("cannot-work", file, entries[0], text, "Raise them.", "dwa_planner.cpp", entries[1:])
 
 
 def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -596,10 +378,10 @@ def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     for entry in off if on and len(off) <= len(on) else on if off else ():
         text = f"use_sim_time is {entry.value} here and not for {len(entries) - min(len(off), len(on))} other nodes."
         source = "nodes on two clocks drop each other's transforms"
-        yield _problem("contradiction", file, entry, text, "Give all the same.", source)
+        yield warning("contradiction", file, entry, text, "Give all the same.", source)
 
 
 RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
-    _simulated, _predicted, _considered, _settles, _starts, _progress, _window, _cells, _sizes, _marks, _goal_checks,
-    _unknown_space, _drawn, _smoothed, _vectors, _clocks,
+    _simulated, _predicted, _considered, _settles, _starts, _progress, window.window, _cells, _sizes, *layers.RULES,
+    _goal_checks, _unknown_space, _drawn, *smoother.RULES, _clocks,
 )  # fmt: skip

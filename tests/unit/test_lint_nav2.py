@@ -242,8 +242,8 @@ def test_plugins_of_two_releases_in_one_file(tmp_path: Path) -> None:
     ("plugin", "lines", "wanted"),
     [
         (MPPI, ("critics: [ConstraintCritic, CostCritic]", "CostCritic: {cost_weight: 3.81}"), []),
-        (DWB, ("critics: [RotateToGoal, PathAlign]", "PathAlign.scale: 32.0"), []),
-        (DWB, ("critics: [PathAlignCritic]", "PathAlignCritic.scale: 32.0"), []),
+        (DWB, ("critics: [RotateToGoal, BaseObstacle, PathAlign]", "PathAlign.scale: 32.0"), []),
+        (DWB, ("critics: [PathAlignCritic, BaseObstacleCritic]", "PathAlignCritic.scale: 32.0"), []),
         (MPPI, ("critics: [RotateToGoal]",), [("plugin-name", "error", "critics")]),
         (DWB, ("critics: [CostCritic]",), [("plugin-name", "error", "critics")]),
         (MPPI, ("BaseObstacle.scale: 0.02", "BaseObstacle.sum_scores: false"),
@@ -338,7 +338,8 @@ def test_a_step_of_mppi_is_no_shorter_than_one_of_control(
 
 @pytest.mark.parametrize(("size", "found"), [(3, []), (2, ["width"])])
 def test_what_mppi_looks_ahead_lies_on_the_local_costmap(tmp_path: Path, size: int, found: list[str]) -> None:
-    ahead = controller(MPPI, "vx_max: 0.5", "time_steps: 56", "model_dt: 0.05")
+    critics = "critics: [CostCritic, GoalCritic]"
+    ahead = controller(MPPI, "vx_max: 0.5", "time_steps: 56", "model_dt: 0.05", critics)
     problems = findings(tmp_path, ahead + local(f"width: {size}", f"height: {size}"))
     assert [one.parameter.rpartition("/")[2] for one in problems] == found
     assert all("time_steps" in one.text for one in problems)
@@ -443,3 +444,143 @@ def test_a_value_is_judged_only_where_the_release_reads_it(
             "  analytic_expansion_max_cost: true")  # fmt: skip
     found = findings(tmp_path, node("planner_server", "planner_plugins: [GridBased]", *smac), target)
     assert [one.rule for one in found] == rules
+
+
+@pytest.mark.parametrize(
+    ("plugin", "lines", "key"),
+    [
+        (MPPI, ("critics: [ConstraintCritic, GoalCritic, PathAlignCritic]",), "critics"),
+        (MPPI, ("critics: [GoalCritic, ObstaclesCritic]",), ""),
+        (MPPI, ("critics: [GoalCritic, CostCritic]", "CostCritic: {enabled: false}"), "enabled"),
+        (MPPI, ("critics: [GoalCritic, CostCritic]", "CostCritic: {enabled: true}"), ""),
+        (MPPI, ("critics: [GoalCritic, MyOwnCritic]",), ""),
+        (DWB, ("critics: [RotateToGoal, PathDist, GoalDist]",), "critics"),
+        (DWB, ("critics: [RotateToGoal, ObstacleFootprintCritic]",), ""),
+        (DWB, ("critics: [RotateToGoal, BaseObstacle]", "BaseObstacle.scale: 0.0"), "BaseObstacle.scale"),
+        (DWB, ("critics: [RotateToGoal, my_critics::Walls]",), ""),
+        (DWB, ("critics: [RotateToGoal, Walls]", "Walls: {class: BaseObstacle}"), ""),
+    ],
+)
+def test_a_controller_none_of_whose_critics_looks_at_obstacles(
+    tmp_path: Path, plugin: str, lines: tuple[str, ...], key: str
+) -> None:
+    assert told(tmp_path, controller(plugin, *lines)) == ([("hinders", "warning", key)] if key else [])
+
+
+LAYERS = {
+    "map": "StaticLayer", "scan": "ObstacleLayer", "voxel": "VoxelLayer", "sonar": "RangeSensorLayer",
+    "noise": "DenoiseLayer", "inflated": "InflationLayer", "again": "InflationLayer",
+}  # fmt: skip
+
+
+def layered(*names: str, plugin: str = "", also: str = "update_frequency: 5.0") -> str:
+    lines = [f"{one}: {{plugin: 'nav2_costmap_2d::{LAYERS[one]}'}}" for one in names if one in LAYERS]
+    own = [f"own: {{plugin: '{plugin}'}}"] if plugin else []
+    return costmap(f"plugins: [{', '.join(names)}]", *lines, *own, also)
+
+
+@pytest.mark.parametrize(
+    ("names", "wrong"),
+    [
+        (("map", "scan", "sonar", "noise", "inflated"), []),
+        (("inflated", "scan"), ["scan comes after inflated: its obstacles are not inflated."]),
+        (("inflated", "map"), ["map comes after inflated: its obstacles are not inflated."]),
+        (("map", "scan", "inflated", "noise"), ["noise comes after inflated: what it removes stays inflated."]),
+        (("map", "again", "voxel", "inflated"), []),
+        (("scan", "map", "inflated"), ["map comes after scan: the map overwrites the obstacles."]),
+        (("map", "inflated", "own"), []),
+    ],
+)
+def test_layers_write_into_the_costmap_in_the_order_of_the_list(
+    tmp_path: Path, names: tuple[str, ...], wrong: list[str]
+) -> None:
+    found = findings(tmp_path, layered(*names, plugin="my_layers::Lanes" if "own" in names else ""))
+    assert [one.text for one in found] == wrong
+    assert all((one.rule, one.parameter.rpartition("/")[2]) == ("hinders", "plugins") for one in found)
+
+
+def test_a_map_that_is_added_by_the_larger_cost_overwrites_nothing(tmp_path: Path) -> None:
+    assert findings(tmp_path, layered("scan", "map", "inflated", also="use_maximum: true")) == ()
+
+
+@pytest.mark.parametrize(
+    ("sources", "wrong"), [("scan", False), ("filtered", True), ("scan filtered", False), ("scan filtered rear", False)]
+)
+def test_a_source_by_another_name_than_the_part_that_describes_it(tmp_path: Path, sources: str, wrong: bool) -> None:
+    parts = ["scan"] if " " not in sources else sources.split()
+    layer = ("plugins: [obstacles]", "obstacles:", "  plugin: nav2_costmap_2d::ObstacleLayer",
+             f"  observation_sources: {sources}",
+             *(f"  {one}: {{topic: /{one}, marking: true, clearing: true}}" for one in parts))  # fmt: skip
+    found = [(one.rule, one.hint) for one in findings(tmp_path, costmap(*layer))]
+    assert found == ([("contradiction", "Give both the same name: filtered or scan.")] if wrong else [])
+
+
+@pytest.mark.parametrize(
+    ("plugin", "lines", "velocity", "wrong"),
+    [
+        (DWB, ("max_vel_x: 2.0", "max_vel_theta: 1.0"), "[0.5, 0.0, 1.0]", ["max_vel_x"]),
+        (DWB, ("max_vel_x: 0.2", "max_vel_theta: 1.5"), "[0.2, 0.0, 0.2]", ["max_vel_theta"]),
+        (DWB, ("max_vel_x: 0.26", "max_vel_theta: 1.0"), "[0.26, 0.0, 1.0]", []),
+        (MPPI, ("vx_max: 3.5", "wz_max: 1.9"), "[2.0, 0.0, 2.0]", ["vx_max"]),
+        (RPP, ("desired_linear_vel: 0.5",), "[0.4, 0.0, 0.0, 0.0, 0.0, 1.0]", ["desired_linear_vel"]),
+        (RPP, ("desired_linear_vel: 0.5",), "[1.0, 0.0, 1.0]", []),
+    ],
+)
+def test_a_smoother_lets_through_what_the_controller_plans(
+    tmp_path: Path, plugin: str, lines: tuple[str, ...], velocity: str, wrong: list[str]
+) -> None:
+    found = findings(tmp_path, controller(plugin, *lines) + node("velocity_smoother", f"max_velocity: {velocity}"))
+    slower = [one for one in found if one.rule == "hinders"]
+    assert [name.rpartition("/")[2] for one in slower for name in one.others] == wrong
+
+
+def test_the_values_of_a_controller_behind_a_shim_count(tmp_path: Path) -> None:
+    text = controller("nav2_rotation_shim_controller::RotationShimController", f"primary_controller: {DWB}",
+                      "max_vel_x: 2.0", "angular_dist_threshold: 0.785")  # fmt: skip
+    (found,) = findings(tmp_path, text + node("velocity_smoother", "max_velocity: [0.5, 0.0, 1.0]"))
+    assert (found.rule, found.parameter.rpartition("/")[2]) == ("hinders", "max_velocity")
+
+
+BACKUP = node("behavior_server", "behavior_plugins: [backup]", "backup: {plugin: 'nav2_behaviors::BackUp'}")
+
+
+@pytest.mark.parametrize(
+    ("plugin", "line", "least", "wrong"),
+    [
+        (DWB, "min_vel_x: -0.08", "0.0", True),
+        (DWB, "min_vel_x: 0.0", "0.0", False),
+        (DWB, "min_vel_x: -0.08", "-0.1", False),
+        (MPPI, "vx_min: -0.35", "0.0", True),
+        (RPP, "allow_reversing: true", "0.0", True),
+    ],
+)
+def test_a_smoother_that_lets_nothing_through_backwards(
+    tmp_path: Path, plugin: str, line: str, least: str, wrong: bool
+) -> None:
+    text = controller(plugin, line) + node("velocity_smoother", f"min_velocity: [{least}, 0.0, -1.0]")
+    found = findings(tmp_path, text)
+    assert [one.parameter.rpartition("/")[2] for one in found] == (["min_velocity"] if wrong else [])
+    assert [("backup" in one.hint) for one in findings(tmp_path, text + BACKUP)] == ([True] if wrong else [])
+
+
+@pytest.mark.parametrize(
+    ("critics", "costmap_line", "found"),
+    [("[GoalCritic, CostCritic]", "track_unknown_space: false", ["width"]),
+     ("[GoalCritic, CostCritic]", "track_unknown_space: true", []),
+     ("[GoalCritic, MyCritic]", "rolling_window: true", [])],
+)  # fmt: skip
+def test_only_critics_that_look_at_the_costmap_need_trajectories_on_it(
+    tmp_path: Path, critics: str, costmap_line: str, found: list[str]
+) -> None:
+    ahead = controller(MPPI, "vx_max: 3.0", "time_steps: 56", "model_dt: 0.05", f"critics: {critics}")
+    inflation = ("plugins: [inflated]", "inflated: {plugin: 'nav2_costmap_2d::InflationLayer', inflation_radius: 10.0}")
+    problems = findings(tmp_path, ahead + local("width: 3", "height: 3", costmap_line, *inflation))
+    assert [one.parameter.rpartition("/")[2] for one in problems] == found
+
+
+@pytest.mark.parametrize(("height", "found"), [(2, []), (6, []), (1, ["width"])])
+def test_the_look_ahead_may_be_half_of_the_longer_side(tmp_path: Path, height: int, found: list[str]) -> None:
+    width = 5 if height == 2 else 2
+    text = controller(RPP, "lookahead_dist: 1.5") + local(f"width: {width}", f"height: {height}")
+    problems = findings(tmp_path, text)
+    assert [one.parameter.rpartition("/")[2] for one in problems] == found

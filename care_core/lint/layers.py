@@ -1,0 +1,114 @@
+"""Layers of a costmap: their order, their sources, what marks obstacles and what takes them away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.readers import INFLATIONS, MARKING, OBSTACLES, Reader, Readers, warning
+from care_core.lint.scopes import COSTMAP, class_of, words_of
+
+_RANGES = {"obstacle_max_range": 2.5, "raytrace_max_range": 3.0}
+"""What a source of Nav2's obstacle layers has where nothing is written, m (obstacle_layer.cpp)."""
+Listed = Sequence[tuple[str, str]]
+"""Layers that are loaded and on, with their class, in their order."""
+_ORDER = "layered_costmap.cpp, updateMap: layers write into the costmap in the order of the list"
+
+
+def _marks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Costmaps into which nothing puts obstacles, or out of which nothing takes them, and obstacles that stay."""
+    for costmap in held.of(COSTMAP):
+        layers = [one for one in held.within(costmap.scope) if one.is_a(*OBSTACLES)]
+        marking = [one for one in layers if not one.is_off("enabled")]
+        if layers and not marking and any("local_costmap" in key for key in costmap.scope):
+            text = "No layer of the local costmap that marks obstacles is on: the robot drives blind."
+            yield warning("hinders", file, layers[0].values["enabled"], text, "Switch one on.", "obstacle_layer.cpp")
+        for name, what in (("marking", "puts obstacles into it"), ("clearing", "takes obstacles out of it")):
+            switches = [entry for layer in marking for entry in layer.own(name)]
+            if switches and all(entry.value == "false" for entry in switches):
+                text = f"No source of {costmap.scope[-1] if costmap.scope else 'the costmap'} {what}."
+                hint = f"Switch {name} on for one."
+                yield warning("hinders", file, switches[0], text, hint, "obstacle_layer.cpp", switches[1:])
+    for reader in held.of(*OBSTACLES, COSTMAP):
+        yield from _uncleared(file, reader)
+
+
+def _uncleared(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
+    """Sources that mark obstacles farther away than they clear."""
+    for short, far in (("raytrace_range", "obstacle_range"), ("raytrace_max_range", "obstacle_max_range")):
+        keys = {key[: -len(last)] for key in reader.values for last in (short, far) if key.endswith(last)}
+        for source in sorted(keys):
+            marked, cleared = reader.values.get(f"{source}{far}"), reader.values.get(f"{source}{short}")
+            one_is_default = marked is None or cleared is None
+            if reader.is_off(f"{source}marking") or reader.is_off(f"{source}clearing"):
+                continue
+            if one_is_default and (short not in _RANGES or not source or not reader.is_on(f"{source}clearing")):
+                continue
+            far_m, short_m = (_RANGES.get(name, 0.0) if one is None else one.number or 0.0
+                              for one, name in ((marked, far), (cleared, short)))  # fmt: skip
+            entry = cleared or marked
+            if entry is not None and 0 < short_m < far_m:
+                said = [" by default" if one is None else "" for one in (marked, cleared)]
+                text = f"{far} ({far_m:g} m{said[0]}) is above {short} ({short_m:g} m{said[1]})."
+                hint = "What is marked beyond is never cleared."
+                others = [marked] if cleared is not None and marked is not None else []
+                yield warning("contradiction", file, entry, text, hint, "obstacle_layer.cpp", others)
+
+
+def _ordered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Layers of Nav2 that come too late in the list: it is the order in which they write into the costmap."""
+    for reader in held.of(COSTMAP, "PluginContainerLayer"):
+        entry = reader.values.get("plugins")
+        off = {one.scope[-1] for one in held.within(reader.scope) if one.is_off("enabled")}
+        classes = {name: one for name in words_of(entry) if (one := reader.values.get(f"{name}.plugin"))}
+        listed = [(name, class_of(str(one.value))) for name, one in classes.items() if name not in off]
+        if entry is not None:
+            yield from _overwritten(file, reader, entry, listed)
+            yield from _not_inflated(file, entry, listed)
+
+
+def _overwritten(file: ConfigFile, costmap: Reader, entry: Entry, listed: Listed) -> Iterator[Problem]:
+    """Obstacles over which a map is written."""
+    maps = [place for place, (_, layer) in enumerate(listed) if layer == "StaticLayer"]
+    marked = [name for name, layer in listed[: maps[-1] if maps else 0] if layer in MARKING]
+    if marked and not costmap.is_on("use_maximum"):
+        name = listed[maps[-1]][0]
+        text = f"{name} comes after {marked[0]}: the map overwrites the obstacles."
+        hint = f"Put {name} first, or switch use_maximum of the costmap on."
+        yield warning("hinders", file, entry, text, hint, "static_layer.cpp, updateCosts")
+
+
+def _not_inflated(file: ConfigFile, entry: Entry, listed: Listed) -> Iterator[Problem]:
+    """Obstacles that are written after all inflation is done."""
+    places = [place for place, (_, layer) in enumerate(listed) if layer in INFLATIONS]
+    if not places:
+        return
+    last = listed[places[-1]][0]
+    for name, layer in listed[places[-1] + 1 :]:
+        if layer in (*MARKING, "StaticLayer"):
+            text = f"{name} comes after {last}: its obstacles are not inflated."
+        elif layer == "DenoiseLayer":
+            text = f"{name} comes after {last}: what it removes stays inflated."
+        else:
+            continue
+        yield warning("hinders", file, entry, text, f"Put {last} behind {name}.", _ORDER)
+
+
+def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Sources that are named otherwise than the part that is to describe them."""
+    for reader in held.of(*OBSTACLES):
+        entry = reader.values.get("observation_sources")
+        named = words_of(entry)
+        parts = list(dict.fromkeys(key.partition(".")[0] for key in reader.values if "." in key))
+        missing = [name for name in named if name not in parts]
+        spare = [name for name in parts if name not in named]
+        if entry is None or not missing or not spare:
+            continue
+        text = f"observation_sources names {missing[0]}, which has no values here, and {spare[0]} is not named: "
+        text += f"{missing[0]} has the defaults, which clear nothing."
+        hint = f"Give both the same name: {missing[0]} or {spare[0]}."
+        others = [one for key, one in reader.values.items() if key.partition(".")[0] == spare[0] and "." in key]
+        yield warning("contradiction", file, entry, text, hint, "obstacle_layer.cpp, onInitialize", others[:1])
+
+
+RULES = (_marks, _ordered, _sourced)
