@@ -93,7 +93,7 @@ def _place(
     if not place.owners:
         return
     if not facts:
-        problem = unread(file, result, place, likely, is_told=is_told)
+        problem = unread(file, result, place, likely, is_sure=is_told or is_shown)
         if problem is not None:
             yield problem
         return

@@ -28,12 +28,12 @@ _SEARCHED = frozenset({
 """Names that ROS 1 looks for in the namespaces above the one that needs it (searchParam)."""
 
 
-def unread(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], *, is_told: bool) -> Problem | None:
+def unread(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], *, is_sure: bool) -> Problem | None:
     """A name that its reader reads in no release.
 
     Args:
         likely: the distributions that the file may be for.
-        is_told: whether somebody says so, and it is no guess.
+        is_sure: whether somebody or the names of its plugins say so, and it is no guess.
     """
     owner = place.owners[0]
     leftover = next((one for one in LEFTOVERS if one.owner in place.owners and one.name == place.name), None)
@@ -45,9 +45,9 @@ def unread(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str
     misplaced = None if (owner, place.name) in MEANT else _misplaced(file, result, place, others)
     if misplaced is not None:
         return misplaced
-    meant = _meant(result, place, likely if is_told else frozenset())
+    meant = _meant(result, place, likely if is_sure else frozenset())
     first, *_, last = DISTRIBUTIONS[result.ros]
-    text = f"{place.name} is not a parameter of {owner} in any release from {first} to {last}."
+    text = f"{place.name} is not a parameter of {' or '.join(place.owners)} in any release from {first} to {last}."
     hint = f"Did you mean {meant}?" if meant else "Leave it out." if others else "Check its spelling, or leave it out."
     return problem_at("unknown-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
 
