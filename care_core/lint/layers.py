@@ -10,6 +10,8 @@ from care_core.lint.scopes import COSTMAP, class_of, words_of
 
 _RANGES = {"obstacle_max_range": 2.5, "raytrace_max_range": 3.0}
 """What a source of Nav2's obstacle layers has where nothing is written, m (obstacle_layer.cpp)."""
+_OF_SOURCES = (".topic", ".data_type", ".marking", ".clearing")
+"""What tells the part of a source from others of a layer."""
 Listed = Sequence[tuple[str, str]]
 """Layers that are loaded and on, with their class, in their order."""
 _ORDER = "layered_costmap.cpp, updateMap: layers write into the costmap in the order of the list"
@@ -91,7 +93,7 @@ def _not_inflated(file: ConfigFile, entry: Entry, listed: Listed) -> Iterator[Pr
             text = f"{name} comes after {last}: what it removes stays inflated."
         else:
             continue
-        yield warning("hinders", file, entry, text, f"Put {last} behind {name}.", _ORDER)
+        yield warning("hinders", file, entry, text, f"Put {last} after {name}.", _ORDER)
 
 
 def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -99,7 +101,7 @@ def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     for reader in held.of(*OBSTACLES):
         entry = reader.values.get("observation_sources")
         named = words_of(entry)
-        parts = list(dict.fromkeys(key.partition(".")[0] for key in reader.values if "." in key))
+        parts = list(dict.fromkeys(key.rpartition(".")[0] for key in reader.values if key.endswith(_OF_SOURCES)))
         missing = [name for name in named if name not in parts]
         spare = [name for name in parts if name not in named]
         if entry is None or not missing or not spare:
@@ -107,7 +109,7 @@ def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         text = f"observation_sources names {missing[0]}, which has no values here, and {spare[0]} is not named: "
         text += f"{missing[0]} has the defaults, which clear nothing."
         hint = f"Give both the same name: {missing[0]} or {spare[0]}."
-        others = [one for key, one in reader.values.items() if key.partition(".")[0] == spare[0] and "." in key]
+        others = [one for key, one in reader.values.items() if key.startswith(f"{spare[0]}.")]
         yield warning("contradiction", file, entry, text, hint, "obstacle_layer.cpp, onInitialize", others[:1])
 
 

@@ -48,10 +48,11 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of ROS parameters."""
     result = scoped(file)
     distribution = distribution_of(target, result.ros)
-    shown = plugins.shown(file) if result.ros == "ros2" else frozenset()
-    likely = frozenset({distribution}) if distribution else _likely(result, shown)
+    told = frozenset({distribution} if distribution else ())
+    shown = told or (plugins.shown(file) if result.ros == "ros2" else told)
+    likely = told or _likely(result, shown)
     for place in result.places:
-        yield from _place(file, result, place, likely, is_told=bool(distribution), is_shown=bool(shown))
+        yield from _place(file, result, place, likely, shown, is_told=bool(told))
     for entry, key in result.not_loaded:
         name = split(entry)[-2]
         if _is_spare(file, entry):
@@ -86,14 +87,14 @@ def _likely(result: Scoped, shown: frozenset[str]) -> frozenset[str]:
 
 
 def _place(
-    file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], *, is_told: bool, is_shown: bool
+    file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], shown: frozenset[str], *, is_told: bool
 ) -> Iterator[Problem]:
     ros = result.ros
     facts = [fact for owner in place.owners for fact in navigation.known(ros, owner, place.name)]
     if not place.owners:
         return
     if not facts:
-        problem = unread(file, result, place, likely, is_sure=is_told or is_shown)
+        problem = unread(file, result, place, likely, shown)
         if problem is not None:
             yield problem
         return
@@ -102,13 +103,14 @@ def _place(
         problem = _other_distribution(file, result, place, facts, likely, is_told=is_told)
         if problem is not None:
             yield problem
-        if is_told or is_shown:
-            return
+    here = [fact for fact in facts if navigation.distributions(fact, ros) & shown]
+    if shown and not here:
+        return
     dead = _dead(result, place)
     if dead:
         yield problem_at("dead-key", Severity.WARNING, file, place.entry, *dead, _COSTMAP_SOURCE)
         return
-    yield from _value(file, place.entry, now or facts, ros)
+    yield from _value(file, place.entry, now or here or facts, ros)
 
 
 def _is_spare(file: ConfigFile, entry: Entry) -> bool:

@@ -88,7 +88,7 @@ def _slower(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             if top is not None and 0 < limit < (top.number or 0.0) * _SAME:
                 text = (
                     f"max_velocity of velocity_smoother lets {limit:g} {unit} through, and {top.keys[-1]} is "
-                    f"{top.number:g}: the robot {does} slower than the controller reckons."
+                    f"{top.number:g}: the robot {does} slower than the controller plans."
                 )
                 yield warning("hinders", file, entry, text, "Give both the same.", _CLAMPED, [top])
 

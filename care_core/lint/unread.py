@@ -28,12 +28,14 @@ _SEARCHED = frozenset({
 """Names that ROS 1 looks for in the namespaces above the one that needs it (searchParam)."""
 
 
-def unread(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], *, is_sure: bool) -> Problem | None:
+def unread(
+    file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], shown: frozenset[str]
+) -> Problem | None:
     """A name that its reader reads in no release.
 
     Args:
-        likely: the distributions that the file may be for.
-        is_sure: whether somebody or the names of its plugins say so, and it is no guess.
+        likely: the distributions that the file may be for, as far as its names tell.
+        shown: those that somebody or its plugins say it is for; empty where nothing says so.
     """
     owner = place.owners[0]
     leftover = next((one for one in LEFTOVERS if one.owner in place.owners and one.name == place.name), None)
@@ -45,7 +47,7 @@ def unread(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str
     misplaced = None if (owner, place.name) in MEANT else _misplaced(file, result, place, others)
     if misplaced is not None:
         return misplaced
-    meant = _meant(result, place, likely if is_sure else frozenset())
+    meant = _meant(result, place, shown)
     first, *_, last = DISTRIBUTIONS[result.ros]
     text = f"{place.name} is not a parameter of {' or '.join(place.owners)} in any release from {first} to {last}."
     hint = f"Did you mean {meant}?" if meant else "Leave it out." if others else "Check its spelling, or leave it out."
@@ -55,7 +57,7 @@ def unread(file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str
 # What is meant
 
 
-def _meant(result: Scoped, place: Place, likely: frozenset[str]) -> str:
+def _meant(result: Scoped, place: Place, shown: frozenset[str]) -> str:
     """The name of the same reader that is spelled nearly so, empty where that is set already or nothing tells."""
     part, dot, last = place.name.rpartition(".")
     taken = {one.name for one in result.places if one.scope == place.scope}
@@ -66,7 +68,7 @@ def _meant(result: Scoped, place: Place, likely: frozenset[str]) -> str:
         name.rpartition(".")[2]
         for owner in place.owners
         for name in navigation.keys_of(result.ros, owner)
-        if name.startswith("<") == bool(dot) and _is_read(result, owner, name, likely)
+        if name.startswith("<") == bool(dot) and _is_read(result, owner, name, shown)
     ]
     nearest = _nearest(last, own)
     return "" if f"{part}{dot}{nearest}" in taken else nearest
@@ -85,10 +87,10 @@ def _nearest(name: str, own: Sequence[str]) -> str:
     return nearest[0] if most >= _ALIKE and len(nearest) == 1 else ""
 
 
-def _is_read(result: Scoped, owner: str, name: str, likely: frozenset[str]) -> bool:
-    """Whether a distribution that the file may be for reads a name; any, where nothing tells which these are."""
+def _is_read(result: Scoped, owner: str, name: str, names: frozenset[str]) -> bool:
+    """Whether one of these distributions reads a name; any, where there are none."""
     facts = navigation.known(result.ros, owner, name)
-    return not likely or any(navigation.distributions(fact, result.ros) & likely for fact in facts)
+    return not names or any(navigation.distributions(fact, result.ros) & names for fact in facts)
 
 
 def _differs(name: str, other: str, words: Iterable[str]) -> bool:

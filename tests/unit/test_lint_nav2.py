@@ -402,6 +402,17 @@ def test_a_name_that_others_have_by_chance_is_not_moved(tmp_path: Path, text: st
     assert (found.rule, found.hint) == (rule, hint)
 
 
+@pytest.mark.parametrize(
+    ("separator", "target", "proposed"), [("/", "", True), ("::", "rolling", True), ("/", "iron", False)]
+)
+def test_a_proposed_name_is_one_of_the_releases_that_the_file_is_for(
+    tmp_path: Path, separator: str, target: str, proposed: bool
+) -> None:
+    drive = f"drive: {{plugin: 'nav2_behaviors{separator}DriveOnHeading', min_speed: 0.1}}"
+    (found,) = findings(tmp_path, node("behavior_server", "behavior_plugins: [drive]", drive), target)
+    assert found.hint == ("Did you mean minimum_speed?" if proposed else "Check its spelling, or leave it out.")
+
+
 DIRECT = ("controller_plugins: [FollowPath]", "sim_time: 1.7", "FollowPath:", f"  plugin: {DWB}")
 
 
