@@ -24,6 +24,8 @@ from care_core.lint.rules import BY_ID
 _PARAMETER = re.compile(r"\s*([^\s,]+)(?:\s*,\s*|\s+)(\S+)")
 _TAGS = {"int": "int", "float": "float", "bool": "bool", "str": "str", "seq": "list"}
 _DICTITEMS = "dictitems"
+_GROUPS = "groups"
+"""Of a dump of dynamic_reconfigure: how its windows show the values, which its client does not set (client.py)."""
 
 Named = tuple[tuple[str, ...], str, str]
 
@@ -73,6 +75,8 @@ def _walk(node: MappingNode, keys: tuple[str, ...], entries: list[Entry], named:
     for key, value in node.value:
         name = str(key.value).strip("/") or str(key.value)
         here = keys if dumped and name == _DICTITEMS else (*keys, *name.split("/"))
+        if name == _GROUPS and yaml_tree.is_dumped(value):
+            continue
         if isinstance(value, MappingNode):
             _walk(value, here, entries, named, letters=letters)
         elif not dumped and (plain := yaml_tree.plain_value(value, letters=letters)) is not None:

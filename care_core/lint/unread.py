@@ -95,7 +95,7 @@ def _is_read(result: Scoped, owner: str, name: str, names: frozenset[str]) -> bo
 
 def _differs(name: str, other: str, words: Iterable[str]) -> bool:
     """Whether two names that look alike mean two things: `min_vel` and `max_vel`, `timeout` and `first_timeout`."""
-    if other.endswith(f"_{name}"):
+    if other.endswith(f"_{name}") or name.endswith(f"_{other}"):
         return True
     pairs = list(zip(name.split("_"), other.split("_"), strict=False))
     apart = [(one, two) for one, two in pairs if one != two]

@@ -91,6 +91,25 @@ def test_sources_that_a_costmap_itself_names_are_read_by_its_obstacle_layer(tmp_
     assert "observation_persistance is not a parameter of ObstacleLayer" in found.text
 
 
+DUMP = """!!python/object/new:dynamic_reconfigure.encoding.Config
+dictitems:
+  acc_lim_x: 2.5
+  acc_lim_theta: 3.2
+  dt_ref: 0.3
+  weight_obstacle: 50.0
+  groups: !!python/object/new:dynamic_reconfigure.encoding.Config
+    dictitems: {acc_lim_x: 2.5, acc_lim_theta: 3.2, weight_obstacle: 50.0, id: 0, name: Default, parent: 0, type: ''}
+    state: []
+state: []
+"""
+
+
+def test_the_groups_of_a_dump_of_dynamic_reconfigure_are_no_parameters(tmp_path: Path) -> None:
+    assert findings(tmp_path, "teb.yaml", DUMP) == ()
+    (found,) = findings(tmp_path, "teb.yaml", DUMP.replace("dt_ref: 0.3", "dt_reff: 0.3"))
+    assert found.hint == "Did you mean dt_ref?"
+
+
 COSTMAP = """local_costmap:
   local_costmap:
     ros__parameters:

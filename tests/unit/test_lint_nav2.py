@@ -394,6 +394,7 @@ def test_what_is_proposed_for_an_unknown_name_is_free_and_means_the_same(
         (node("planner_server", "plugins: [GridBased]"), "unknown-key", "Did you mean planner_plugins?"),
         (node("behavior_server", "behavior_plugins: [spin]", "spin:", "  plugin: nav2_behaviors::Spin",
               "  timeout: 30.0"), "unknown-key", "Leave it out."),
+        (node("amcl", "use_map_topic: true"), "unknown-key", "Check its spelling, or leave it out."),
         (costmap("transform_timeout: 1.0"), "unknown-key", "Check its spelling, or leave it out."),
     ],
 )  # fmt: skip
