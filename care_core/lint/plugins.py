@@ -152,12 +152,13 @@ def _blind(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: st
     if entry is None or not listed or not all(known.values()):
         return
     looking = [name for name in listed if known[name] in _LOOKING[owner]]
-    off = [one for name in looking for one in [_switched_off(values, here, owner, name)] if one is not None]
+    off = [one for name in looking if (one := _switched_off(values, here, owner, name)) is not None]
     if len(off) < len(looking):
         return
     text = f"No critic of {owner} looks at obstacles: its trajectories lead through them."
     plain = [name.removesuffix("Critic") if owner == _DWB else name for name in _LOOKING[owner]]
-    hint = f"Switch {looking[0]} on." if looking else f"Add {' or '.join(plain)} to the list."
+    mend = f"Raise the scale of {looking[0]}." if off and owner == _DWB else f"Switch {looking[0]} on." if off else ""
+    hint = mend or f"Add {' or '.join(plain)} to the list."
     at = off[0] if off else entry
     yield problem_at("hinders", Severity.WARNING, file, at, text, hint, _BLIND[owner], (entry.name,) if off else ())
 

@@ -103,7 +103,7 @@ def _backwards(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     """A smoother that lets nothing through backwards, though the controller may drive so."""
     for reader in held.of("velocity_smoother"):
         entry = reader.values.get("min_velocity")
-        back = next((one for one in _reversing(held)), None)
+        back = next(_reversing(held), None)
         if entry is None or back is None or numbers(entry)[:1] != [0.0]:
             continue
         text = f"min_velocity of velocity_smoother begins with 0, and {back.keys[-1]} is {_shown(back)}: "
