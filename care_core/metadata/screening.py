@@ -16,6 +16,9 @@ from care_core.records import Record
 TABLE = Path(__file__).with_name("ardupilot_screening.tsv")
 
 
+_OF_LIFT = "Q_"
+
+
 class Flight(Record):
     """One flight with everything at its reference but one parameter."""
 
@@ -40,8 +43,9 @@ def flights_of(name: str, kind: str) -> tuple[Flight, ...]:
 
 
 def screened(kind: str) -> tuple[str, ...]:
-    """The parameters that were screened on a kind of vehicle."""
-    return tuple(name for name, letter in _lines() if letter == VEHICLES.get(kind))
+    """The parameters that were screened on a kind of vehicle; a plane has no lift motors."""
+    own = (name for name, letter in _lines() if letter == VEHICLES.get(kind))
+    return tuple(name for name in own if kind != "plane" or not name.startswith(_OF_LIFT))
 
 
 @cache
