@@ -159,4 +159,10 @@ def _worn(before: Table, loaded: Table, cells: int, span: Span) -> Iterator[Find
     )
 
 
-CHECK = Check("battery", "a battery that was not charged, or whose voltage falls under load", READS, LIMITS, find)
+CHECK = Check(
+    "battery",
+    "a battery that was not charged, sags under load, ran down in the air or has fewer cells than are set",
+    READS,
+    LIMITS,
+    find,
+)

@@ -310,5 +310,9 @@ def _spaced(t: Floats, rows: NDArray[np.intp]) -> NDArray[np.intp]:
 
 READS = reading(ODOMETRY, *COMMANDS, BATTERY, *GOALS)
 CHECK = Check(
-    "drive", "a robot that stands, stops and goes, is slow or pulls against its commands", READS, LIMITS, find
+    "drive",
+    "commands that are none, a robot that stands, stops and goes, is slow or pulls against them",
+    READS,
+    LIMITS,
+    find,
 )

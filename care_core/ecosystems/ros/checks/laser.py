@@ -1,4 +1,4 @@
-"""Laser scanners: silent, frozen, noisy, blind."""
+"""Laser scanners: silent, dropping out, frozen, noisy, blind."""
 
 from __future__ import annotations
 
@@ -179,4 +179,4 @@ def _period(scans: Scans) -> float:
 
 
 READS = reading(SCAN, ODOMETRY, *ROSOUT, *GOALS)
-CHECK = Check("laser", "scanners that fall silent, freeze, scatter or see nothing", READS, LIMITS, find)
+CHECK = Check("laser", "scanners that fall silent, drop out, freeze, scatter or see nothing", READS, LIMITS, find)

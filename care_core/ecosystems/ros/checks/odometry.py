@@ -261,5 +261,9 @@ def _is_number(*values: object) -> bool:
 
 READS = reading(ODOMETRY, *TF, *COMMANDS, *GOALS)
 CHECK = Check(
-    "odometry", "odometry without numbers, that jumps or drifts, a localisation that jumps", READS, LIMITS, find
+    "odometry",
+    "odometry without numbers, that jumps or drifts, a localisation that jumps or has two sources",
+    READS,
+    LIMITS,
+    find,
 )
