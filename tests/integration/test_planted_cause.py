@@ -12,7 +12,7 @@ import pytest
 from care_core.diagnose.judging import judge
 from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import diagnose
-from care_core.ecosystems.findings import NOTHING_SEEN, Finding
+from care_core.ecosystems.findings import NOTHING_SEEN, Finding, Severity
 from care_core.learn.train import train
 from care_core.profile.model import write_model
 from care_core.profile.store import Profile
@@ -203,6 +203,22 @@ def test_a_refusal_for_what_the_profile_does_not_know_blames_no_option(
         assert diagnosis.fix is None
         assert diagnosis.abstained is not None
         assert diagnosis.abstained.startswith("arming was refused: no motors")
+
+
+@pytest.mark.parametrize("severity", ["warning", "critical"])
+def test_what_acts_in_flight_refused_no_arming_though_a_part_led_to_the_refusal(
+    planted: Profile, severity: Severity
+) -> None:
+    refused = Finding("prearm", "arming was refused: Check mag field", 2.0, 3.0, severity, "", "MSG", "parameter")
+    part = Finding("compass", "the compass is wrong", 1.0, 3.0, "critical", "", "MAG", probability=0.6)
+    judged = judge(planted_run(min_sats=13, speed=1.4), planted.schema, planted.model, {})
+
+    def named(*findings: Finding) -> set[str]:
+        diagnosis = diagnose(judged, planted, CHOICE, health=replace(NOTHING_SEEN, findings=findings))
+        return {one.name for one in diagnosis.hypotheses if one.what == "parameter"} - {""}
+
+    assert named(part)
+    assert named(replace(part, consequences=(refused,))) == set()
 
 
 def test_a_mission_that_armed_is_not_blamed_on_arming(planted: Profile) -> None:

@@ -213,6 +213,13 @@ def test_refused_arming_is_one_mission_with_the_last_reasons() -> None:
     assert value(mission, "mission_time") == Unavailable("the vehicle never armed", "see why arming was refused")
 
 
+def test_a_vehicle_that_nobody_tried_to_arm_lost_no_mission() -> None:
+    texts = [(30.0, "PreArm: RC not found"), (60.0, "PreArm: RC not found")]
+    found = value(only({"MSG": table(texts, "Message")}), "mission_success")
+    assert isinstance(found, Unavailable)
+    assert "its firmware does not say whether anybody asked it to; it would refuse: RC not found" in found.reason
+
+
 def test_a_refusal_before_arming_is_no_evidence() -> None:
     assert value(only(flight()), "arming_refused") == 0.0
 
