@@ -38,6 +38,7 @@ _LIES_S = LIMITS.add("time after a fall in which it lies", 2.0, "s", "a choice: 
 _FALLING = LIMITS.add("what an accelerometer feels in a fall", 5.0, "m/s^2", "half of gravity; the air brakes the rest")
 _FALL_S = LIMITS.add("shortest fall", 0.15, "s", "half of that from half a metre; a bounce is over sooner")
 _CUT_S = LIMITS.add("time in which it falls without motors", 1.0, "s", "a choice: they stop at once")
+_STILL = LIMITS.add("change of what an accelerometer feels that lies", 1.0, "m/s^2", "motors shake it by more")
 _ENDED_S = LIMITS.add("time in which it is on the ground or disarmed", 10.0, "s", "COM_DISARM_LAND: 2 s, and margin")
 _ACRO = 10
 """nav_state of acro, in which every attitude is meant (vehicle_status.msg)."""
@@ -106,7 +107,9 @@ def _struck(flight: Px4Flight) -> Hit | None:
         blow = float(np.max(felt[(table.t >= at) & (table.t <= at + 1.0)]))
         usual = felt[(table.t >= at - _USUAL_S) & (table.t < at - 0.2)]
         is_blow = not len(usual) or blow > _OVER_USUAL * float(np.max(usual))
-        if speed > _HIT_MS and is_blow and _ends_after(flight, at):
+        after = felt[(table.t >= at + _LIES_S) & (table.t <= at + 2 * _LIES_S)]
+        lies = len(after) > 2 and float(np.ptp(after)) < _STILL  # though it stays armed, as planes do
+        if speed > _HIT_MS and is_blow and (lies or _ends_after(flight, at)):
             return Hit(at, speed, blow, at - _FALLS_S)
     return None
 
