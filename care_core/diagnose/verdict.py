@@ -297,8 +297,12 @@ def _failed(
     if fit == "no" and len(unknown) == len(objectives):
         return unjudged(findings)
     if unknown:
-        reason = next((f": {one.reason}" for one in unknown if one.reason), "")
-        return f"no fault found, but {', '.join(one.name for one in unknown)} could not be evaluated{reason}"
+        reasons = [one.reason for one in unknown if one.reason]
+        reason = next(iter(reasons), "")
+        if len(unknown) == len(objectives) and len({one.partition(",")[0] for one in reasons}) == 1:
+            return reason
+        names = ", ".join(one.name for one in unknown)
+        return f"no fault found, but {names} could not be evaluated{': ' if reason else ''}{reason}"
     if status == "not_evaluated":
         return "nothing that could be judged failed" if fit == "no" else "nothing could be judged"
     part = next(filter(_is_broken_part, findings), None)

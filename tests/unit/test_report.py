@@ -167,7 +167,7 @@ def test_the_other_headlines() -> None:
     assert to_text(unknown).startswith("NOT EVALUATED: ")
     assert "No change advised: nothing in the profile" in to_text(lost)
     assert "**OK**: all objectives are within their thresholds." in to_markdown(build_document(fine))
-    assert "**NOT EVALUATED**: no fault found, but" in to_markdown(build_document(unknown))
+    assert "**NOT EVALUATED**: no BAT in the log." in to_markdown(build_document(unknown))
     assert "No change advised: nothing in the profile explains this run" in to_markdown(build_document(lost))
 
 

@@ -119,7 +119,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
 
 def _against(peak: float) -> str:
     """What the documentation says of such a level."""
-    return f"limit {HIGH:.0f}" if peak > HIGH else f"acceptable below {HIGH:.0f}"
+    return f"limit {HIGH:.0f}" if peak > HIGH else f"below the usual limit of {HIGH:.0f}, yet it rose"
 
 
 def _clipped(table: Table, calm: np.ndarray) -> float:
