@@ -61,6 +61,7 @@ DROVE_M = 1.0
 """So far no robot is pushed or drifts that is done with its goals."""
 PILOTED = re.compile(r"joy|teleop|key", re.IGNORECASE)
 """In the name of a topic on which a person drives."""
+_SIMULATED_CLOCK = "/clock"
 FEWEST_COMMANDS = 3
 """Fewer commands tell of no drive."""
 
@@ -196,7 +197,7 @@ class Drive(RunModel):
 
     def ends_early(self, topic: str) -> tuple[float, float] | None:
         """When a stream was heard last and its period, s; None where it goes on to the end, or nothing goes on after
-        it."""
+        it but the clock of a simulator."""
         period_s = self.streams.get(topic)
         if period_s is None:
             return None
@@ -204,7 +205,7 @@ class Drive(RunModel):
         silent_s = self.duration_s - last_s
         if silent_s < max(SILENT_S, SILENT_PERIODS * period_s):
             return None
-        others = (self.times[name][-1] for name in self.streams if name != topic)
+        others = (self.times[name][-1] for name in self.streams if name not in (topic, _SIMULATED_CLOCK))
         return (last_s, period_s) if any(self.duration_s - end < silent_s / 2 for end in others) else None
 
     # Motion
