@@ -129,6 +129,17 @@ def test_a_transition_of_a_quadplane(done_s: float | None, is_slow: bool) -> Non
     assert told == ["the transition to the wings takes too long"] * is_slow
 
 
+@pytest.mark.parametrize(("scale", "named"), [(1.1, True), (0.0, False)])
+def test_a_take_off_that_its_time_limit_ended_names_the_limit(scale: float, named: bool) -> None:
+    flown = MadePlane()
+    flown.settings |= {"Q_ENABLE": 1, "Q_TKOFF_FAIL_SCL": scale}
+    flown.rows["MSG"].append((27.0, {"Message": "Failed to complete takeoff within time limit"}))
+    found = [one for one in every_finding(flown.find()) if one.kind == "takeoff"]
+    assert [(one.onset_s, one.parameters, one.severity) for one in found] == [
+        (27.0, ("Q_TKOFF_FAIL_SCL",), "critical")
+    ] * named
+
+
 @pytest.mark.parametrize("pulse_most", [2000.0, 0.0])
 @pytest.mark.parametrize(("spin_most", "suspect"), [(0.6, "parameter"), (0.95, "hardware")])
 def test_a_quadplane_that_stays_on_the_ground_with_all_its_lift(

@@ -41,7 +41,7 @@ from care_core.ecosystems.ardupilot.checks.settings import (
     supply,
     thrust_curve,
 )
-from care_core.ecosystems.ardupilot.checks.wings import airspeed, lift, propeller, surfaces, transition
+from care_core.ecosystems.ardupilot.checks.wings import airspeed, lift, propeller, surfaces, time_to_climb, transition
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -59,6 +59,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     propeller.CHECK,
     surfaces.CHECK,
     transition.CHECK,
+    time_to_climb.CHECK,
     attitude.CHECK,
     barometer.CHECK,
     battery.CHECK,
