@@ -5,6 +5,7 @@ It is made of a diagnosis, or of the document of one that was remembered. Needs 
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Collection, Sequence
 from typing import Literal, Protocol, TypeVar
@@ -30,6 +31,8 @@ STATUS_WORDS: dict[RunStatus, str] = {
 UNKNOWN_PARAMETER = "a parameter that the profile does not know"
 GUESS = "\u00a0probability\u00a0(a\u00a0guess)"
 NO_LIMIT = "no limit of this mission is known; what happened is told below"
+_CLAUSE = re.compile(r"\s*[,;(]")
+"""What ends the first clause of a reason."""
 NO_LIMITS = "no limits for time and energy, no causes by parameters"
 MOST_FINDINGS = 2
 """Findings that the sentence names."""
@@ -299,7 +302,7 @@ def _failed(
     if unknown:
         reasons = [one.reason for one in unknown if one.reason]
         reason = next(iter(reasons), "")
-        if len(unknown) == len(objectives) and len({one.partition(",")[0] for one in reasons}) == 1:
+        if len(unknown) == len(objectives) and len({_CLAUSE.split(one)[0] for one in reasons}) == 1:
             return reason
         names = ", ".join(one.name for one in unknown)
         return f"no fault found, but {names} could not be evaluated{': ' if reason else ''}{reason}"

@@ -153,6 +153,17 @@ def test_a_refusal_to_arm_is_told_once() -> None:
     assert verdict_on([refused], [finding]).headline == "FAULT: arming was refused: Compass not healthy"
 
 
+def test_one_reason_for_all_that_could_not_be_judged_is_the_first_line() -> None:
+    def unknown(reason: str) -> ObjectiveResult:
+        return ObjectiveResult(SUCCESS, None, SUCCESS.threshold, "not_evaluated", reason)
+
+    why = "the vehicle never armed, and nobody asked it to; it would refuse: RC not found"
+    never = [unknown(why), unknown("the vehicle never armed (see why arming was refused)")]
+    assert verdict_on(never).headline == f"NOT EVALUATED: {why}"
+    for several in ([*never, unknown("no BAT in the log")], [*never, MET]):
+        assert verdict_on(several).headline.startswith("NOT EVALUATED: no fault found, but ")
+
+
 def test_the_fit_comes_last_in_one_line_and_names_no_profile_that_does_not_matter() -> None:
     reasons = ("the log does not say what vehicle it is of, the profile is for a copter", "old firmware", "few topics")
     verdict = verdict_on([MET], fit=Fit("partly", reasons))
