@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from care_core.diagnose.failed_run import FailedRun
 from care_core.diagnose.records import ObjectiveResult
-from care_core.ecosystems.findings import Health
+from care_core.ecosystems.findings import Health, every_finding
 from care_core.run import is_known
 from care_core.text import listed
 from care_core.variables import Variable
@@ -13,7 +13,7 @@ from care_core.variables import Variable
 def refused_otherwise(failed: FailedRun, health: Health) -> str | None:
     """Said where the run ended at a refusal to arm that speaks of no option of the profile: for what an operator has to
     do, or for none of the complaints that the profile tells apart. What options do in flight is no cause of it."""
-    said = next((one for one in health.findings if one.kind == "prearm"), None)
+    said = next((one for one in every_finding(health.findings) if one.kind == "prearm"), None)
     if said is None or failed.run.refused_by:
         return None
     if said.parameters:

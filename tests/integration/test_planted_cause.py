@@ -209,7 +209,7 @@ def test_a_refusal_for_what_the_profile_does_not_know_blames_no_option(
 def test_what_acts_in_flight_refused_no_arming_though_a_part_led_to_the_refusal(
     planted: Profile, severity: Severity
 ) -> None:
-    refused = Finding("prearm", "arming was refused: Check mag field", 2.0, 3.0, severity, "", "MSG", "parameter")
+    refused = Finding("prearm", "arming was refused: Check mag field", 2.0, 3.0, severity, "", "MSG", "operation")
     part = Finding("compass", "the compass is wrong", 1.0, 3.0, "critical", "", "MAG", probability=0.6)
     judged = judge(planted_run(min_sats=13, speed=1.4), planted.schema, planted.model, {})
 
@@ -217,8 +217,11 @@ def test_what_acts_in_flight_refused_no_arming_though_a_part_led_to_the_refusal(
         diagnosis = diagnose(judged, planted, CHOICE, health=replace(NOTHING_SEEN, findings=findings))
         return {one.name for one in diagnosis.hypotheses if one.what == "parameter"} - {""}
 
+    led = replace(part, consequences=(refused,))
     assert named(part)
-    assert named(replace(part, consequences=(refused,))) == set()
+    assert named(led) == set()
+    diagnosis = diagnose(judged, planted, CHOICE, health=replace(NOTHING_SEEN, findings=(led,)))
+    assert not any(fault.causes for fault in diagnosis.faults), "nor is any tried out in flight"
 
 
 def test_a_mission_that_armed_is_not_blamed_on_arming(planted: Profile) -> None:
