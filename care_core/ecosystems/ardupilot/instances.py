@@ -21,8 +21,7 @@ from care_core.numbers import distinct
 Floats = NDArray[np.float64]
 
 _NO_FIX, FIX = 1.0, 3.0
-"""GPS.Status of a receiver without a fix, and from which it has one in three dimensions."""
-"""GPS.Status of a receiver that is there and has no fix."""
+"""GPS.Status of a receiver that is there and has no fix, and from which it has one in three dimensions."""
 _CENTIVOLTS = 200.0
 """A pack reads more than this only where it is recorded in hundredths of a volt (CURR before 3.3)."""
 _FULL_SCALE = 2.0

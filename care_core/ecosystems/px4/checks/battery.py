@@ -15,8 +15,7 @@ from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
 
 _TOPIC = "battery_status"
-_FIELDS = ("voltage_v", "current_a", "remaining", "warning")
-READS: Wanted = {_TOPIC: _FIELDS}
+READS: Wanted = {_TOPIC: ("voltage_v", "current_a", "remaining", "warning")}
 LIMITS = Limits()
 _CHARGED = LIMITS.add("charge at arming", 0.5, "of the battery", "a choice: a mission is planned with a full one")
 _TIRED = LIMITS.add("resistance of a cell", 30.0, "mOhm", "sound lithium cells have 2 to 10; old ones 20")
@@ -64,10 +63,9 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
 
 def _fewer_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
     """By its voltage at rest, which no pack of so many cells has that is still flown."""
-    name = next((name for name in _CELLS_SET if code(flight.log.settings(), name)), None)
-    cells = code(flight.log.settings(), name) if name else None
+    name, cells = _cells_set(flight)
     rest = table.where((table["current_a"] < _LEAST_A) & (table.t <= table.t[0] + _BEGINS_S))
-    if name is None or not cells or len(rest) < _FEWEST:
+    if not cells or len(rest) < _FEWEST:
         return
     volts = float(median(rest["voltage_v"]))
     fits = [n for n in range(1, cells) if _PER_CELL[0] <= volts / n <= _PER_CELL[1]]
@@ -92,12 +90,18 @@ def _fewer_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
     )
 
 
+def _cells_set(flight: Px4Flight) -> tuple[str, int]:
+    """The parameter that tells how many cells there are, and how many it tells; none where no parameter does."""
+    told = ((name, code(flight.log.settings(), name)) for name in _CELLS_SET)
+    return next(((name, cells) for name, cells in told if cells), ("", 0))
+
+
 def _ran_down(flight: Px4Flight) -> Iterator[Finding]:
     """By the firmware's own level of it, in the air."""
     table = flight.table(_TOPIC, "voltage_v", "current_a", "warning")
     if table is None:
         return
-    cells = next((n for name in _CELLS_SET if (n := code(flight.log.settings(), name))), 0)
+    _, cells = _cells_set(flight)
     for span in flight.aloft:
         flown = table.between(*span)
         empty = flown["warning"] == _EMERGENCY
