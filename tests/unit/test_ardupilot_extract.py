@@ -213,6 +213,14 @@ def test_refused_arming_is_one_mission_with_the_last_reasons() -> None:
     assert value(mission, "mission_time") == Unavailable("the vehicle never armed", "see why arming was refused")
 
 
+def test_a_refusal_stands_though_the_log_breaks_off() -> None:
+    whole = only({"MSG": table([(30.0, "Arm: Gyros not calibrated")], "Message")})
+    cut = Mission(whole.model, whole.tables, whole.start_s, whole.end_s, False, whole.spec, {})
+    assert KIND.is_decided(cut)
+    unasked = only({"MSG": table([(30.0, "PreArm: Gyros not calibrated")], "Message")})
+    assert not KIND.is_decided(Mission(unasked.model, unasked.tables, 0.0, unasked.end_s, False, unasked.spec, {}))
+
+
 def test_a_vehicle_that_nobody_tried_to_arm_lost_no_mission() -> None:
     texts = [(30.0, "PreArm: RC not found"), (60.0, "PreArm: RC not found")]
     found = value(only({"MSG": table(texts, "Message")}), "mission_success")

@@ -38,8 +38,6 @@ READS: Wanted = {
 _MODES = 2.0**32
 _SAME = 1e-5
 """A parameter is stored in 32 bits, its default written in decimals."""
-_LAST_S = 1.0
-"""Damage so near to the end is the end."""
 _REASONS_KNOWN = (4, 0)
 """Since Copter 4.0 MODE.Rsn means the same on every vehicle (AP_Vehicle/ModeReason.h)."""
 
@@ -120,11 +118,6 @@ class Recorded(RunModel):
     def is_telemetry(self) -> bool:
         """Whether a ground station heard it: then holes are the link's."""
         return self.log.format is formats.MAVLINK_TLOG
-
-    @property
-    def breaks_off(self) -> bool:
-        """Whether the log is damaged at its end: what was not yet may still have come."""
-        return any(one.time_s is None or one.time_s >= self.end_s - _LAST_S for one in self.log.damage)
 
     @property
     def clock_jumps(self) -> bool:

@@ -20,7 +20,7 @@ _BY_OPERATOR = re.compile(
     r"""
       mode\snot\sarmable | \bRC\d*\s?.*(not\s(found|calibrated)|neutral|radio) | not\sneutral | rudder
     | (Throttle|collective)\s.*(high|low|neutral|below\sfailsafe) | Radio\sfailsafe | safety\sswitch | Leaning
-    | (compass|accels?|accelerometers?|INS)\s.*(not\scalibrated|calib\w*\sneeded|needs?\scalib)
+    | (compass|accels?|accelerometers?|gyros?|INS)\s.*(not\scalibrated|calib\w*\sneeded|needs?\scalib)
     | calibration\s(needed|running) | reboot | Emergency\sStop | Interlock | switch(es)?\s(is\s)?on | SD\scard | Logging
     | Rally | Mission: | Auto\smode\srequires
     """,
@@ -46,7 +46,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     why = max(counts, key=lambda one: counts[one])
     begin = next(one.time_s for one in refusals if _plain(one.why) == why)
     asked = any(one.was_tried for one in refusals)
-    severity: Severity = "critical" if asked and not flight.breaks_off else "warning"
+    severity: Severity = "critical" if asked else "warning"
     by_operator = all(_BY_OPERATOR.search(one.why) for one in lasting)
     suspect: SuspectKind = "operation" if by_operator else "parameter"
     complaints = tuple(dict.fromkeys(_plain(one.why) for one in lasting))

@@ -42,6 +42,13 @@ def last_refusals(mission: Mission) -> list[Refusal]:
     return sorted(standing.values(), key=lambda one: (one.time_s, one.text))
 
 
+def refused_for(mission: Mission) -> str:
+    """What stood when arming was last refused, a few of it in words; empty where nothing was refused."""
+    if not flight_of(mission).refusals:
+        return ""
+    return listed(list(dict.fromkeys(one.why for one in last_refusals(mission)))[:_FEW])
+
+
 def was_asked(mission: Mission) -> bool:
     """Whether a text says that somebody tried to arm it."""
     return any(one.was_tried for one in flight_of(mission).refusals)
@@ -50,8 +57,8 @@ def was_asked(mission: Mission) -> bool:
 def never_asked(mission: Mission) -> Unavailable:
     """Of a vehicle that never armed, and that nobody tried to arm as far as is known: what it would have said."""
     flight = flight_of(mission)
-    standing = [one.why for one in last_refusals(mission)] if flight.refusals else []
-    why = f"; it would refuse: {listed(standing[:_FEW])}" if standing else ""
+    refused = refused_for(mission)
+    why = f"; it would refuse: {refused}" if refused else ""
     tells = flight.vehicle.version is not None and flight.vehicle.version[:2] >= _TELLS
     asked = "nobody asked it to" if tells else "its firmware does not say whether anybody asked it to"
     return Unavailable(f"the vehicle never armed, and {asked}{why}")

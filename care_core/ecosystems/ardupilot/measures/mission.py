@@ -91,7 +91,8 @@ class ArduPilotFlight(MissionKind):
         return shortfall(mission)
 
     def is_decided(self, mission: Mission) -> bool:
-        return is_over(mission) or (is_armed(mission) and failed(mission))
+        # Power is pulled of a vehicle that would not arm, which cuts the log's last record: the refusal stands.
+        return is_over(mission) or (failed(mission) if is_armed(mission) else was_asked(mission))
 
     def checks(self, mission: Mission) -> tuple[Check, ...]:
         return () if not is_armed(mission) or flew_automatically(mission) else tuple(plain_checks(mission))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from care_core.ecosystems.ardupilot.measures.events import crash_of, errors, forced, last_refusals, telling
+from care_core.ecosystems.ardupilot.measures.events import crash_of, errors, forced, refused_for, telling
 from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.ardupilot.measures.route import landing_error
@@ -25,8 +25,8 @@ _LONGEST = 60
 def shortfall(mission: Mission) -> tuple[str, ...]:
     """What kept the mission from being accomplished: what was not reached, then what ended it, in order of time."""
     if not is_armed(mission):
-        refused = last_refusals(mission)
-        return (f"arming was refused: {refused[-1].why}",) if refused else ("the vehicle never armed",)
+        why = refused_for(mission)
+        return (f"arming was refused: {why}",) if why else ("the vehicle never armed",)
     return tuple(_clauses(mission))
 
 
