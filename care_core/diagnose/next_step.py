@@ -8,10 +8,11 @@ from collections.abc import Iterable
 from care_core.diagnose.parts import is_pack, mend_first
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
-from care_core.ecosystems.ranking import SYMPTOMS
+from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, vehicle_of
 from care_core.logs.formats import MAVLINK_TLOG, format_named
 from care_core.run import Run, shown
+from care_core.text import listed
 
 UPSETS: frozenset[FindingKind] = frozenset(("attitude", "crash", "motor", "takeoff", "thrust"))
 """Kinds of findings after which a vehicle may be damaged, or does not do what it is told."""
@@ -58,12 +59,13 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
         return f"make the change, {again}, and check what it brought with 'care verify REPORT LOG'"
     if has_failed and (undone := _undone(diagnosis)):
         return f"{undone}, then try it {trial(run)}" if upset else undone
-    name = _named(diagnosis) if has_failed else ""
+    named = _named(diagnosis) if has_failed else ()
     if has_failed and upset:
-        is_symptom = any(one.title == name and one.kind in SYMPTOMS for one in findings)
-        return f"check on the bench: {name}; then try it {trial(run)}" if name and not is_symptom else bench(run)
-    if name:
-        return f"look at what this names: {name}"
+        symptoms = {one.title for one in findings if one.kind in SYMPTOMS}
+        to_check = [name for name in named if name not in symptoms]
+        return f"check on the bench: {listed(to_check)}; then try it {trial(run)}" if to_check else bench(run)
+    if named:
+        return f"look at what this names: {listed(named)}"
     if has_failed and diagnosis.tell_more:
         return diagnosis.tell_more[0]
     if diagnosis.profile.fit.verdict != "no":
@@ -73,13 +75,14 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
     return "'care inspect LOG' tells what each profile would need"
 
 
-def _named(diagnosis: Diagnosis) -> str:
-    """The part or circumstance to look at, empty where none is named first."""
+def _named(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """What to look at: the part or circumstance that is likeliest, and the part that is mended before anything else."""
     part = mend_first(diagnosis.health.findings)
-    if part is not None:
-        return part.title
     first = next(iter(diagnosis.hypotheses), None)
-    return first.name if first is not None and first.what in ("hardware", "world") else ""
+    leading = first.name if first is not None and first.what in ("hardware", "world") else ""
+    if part is None:
+        return (leading,) if leading else ()
+    return (leading, part.title) if leading and leading != part.title and first.probability > LIKELY else (part.title,)
 
 
 def _undone(diagnosis: Diagnosis) -> str:

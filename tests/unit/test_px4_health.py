@@ -191,6 +191,21 @@ def test_motors_that_are_killed_on_the_ground_fell_nowhere_whatever_the_height_s
     assert falls_after(flight, 40.0) is killed
 
 
+@pytest.mark.parametrize(("swings_deg", "killed"), [(0.0, False), (50.0, True)])
+def test_what_hangs_on_a_line_after_the_kill_switch_was_in_the_air(swings_deg: float, killed: bool) -> None:
+    t = np.arange(0.0, 50.0, 0.02)
+    half = np.radians(np.interp(t, [40.0, 41.5], [5.0, 5.0 + swings_deg])) / 2
+    still = np.zeros_like(t)
+    flight = Px4Flight(MadeLog({
+        "vehicle_status": FLOWN,
+        "vehicle_local_position": states(z=[(0, 0.0), (12, -1.6)]),
+        "logged_messages": words((0.0, "INFO", "Arming check: Kill switch engaged"), (40.0, "WARNING", "Kill engaged")),
+        "sensor_combined": Table(t, {f"accelerometer_m_s2[{n}]": still + 9.7 * (n == 2) for n in range(3)}),
+        "vehicle_attitude": Table(t, {"q[0]": np.cos(half), "q[1]": np.sin(half), "q[2]": still, "q[3]": still}),
+    }))  # fmt: skip
+    assert ("the kill switch cut the motors in the air" in [one.title for one in examine(flight).findings]) is killed
+
+
 def test_the_failure_detector_has_the_time_at_which_it_acted() -> None:
     def flown(**topics: Table) -> Px4Flight:
         return Px4Flight(MadeLog({"vehicle_status": FLOWN, **topics}))
@@ -333,3 +348,23 @@ def test_a_battery_that_keeps_it_from_arming_is_the_battery() -> None:
     })))  # fmt: skip
     found = {one.title for root in health.findings for one in (root, *root.below)}
     assert {"the battery was not charged", "not ready to fly: Low battery level"} <= found
+
+
+def test_a_rover_that_is_driven_and_stands_is_told_with_what_its_driver_says() -> None:
+    t = np.arange(0.0, 50.0, 0.1)
+    still = np.zeros_like(t)
+    topics = {
+        "vehicle_status": states(arming_state=[(0, 1), (5, 2), (45, 1)], vehicle_type=[(0, 3), (1, 3)]),
+        "actuator_motors": Table(t, {f"control[{n}]": np.where(t < 40.0, 0.4, 0.0) for n in range(2)}),
+        "vehicle_local_position": Table(
+            t, {"vx": np.where(t < 20.0, 0.3, 0.0), "vy": still, "heading": still, "z": still}
+        ),
+        "logged_messages": words(*((10.0 + n / 10, "ERROR", f"[roboclaw] ACK timeout {n}") for n in range(200))),
+    }
+    blocked, repeated = examine(Px4Flight(MadeLog(topics))).findings
+    assert (blocked.title, blocked.suspect) == ("the vehicle is driven and does not move", "hardware")
+    assert "roboclaw: ACK timeout N (100 times)" in blocked.evidence
+    assert repeated.title == "the firmware repeats an error: roboclaw: ACK timeout N"
+    drives = {**topics["vehicle_local_position"].columns, "vx": still + 0.3}
+    moving = examine(Px4Flight(MadeLog({**topics, "vehicle_local_position": Table(t, drives)})))
+    assert [one.kind for one in moving.findings] == ["software"]

@@ -14,6 +14,10 @@ from care_core.records import Record
 from care_core.text import log_time
 
 
+_BLOW_S = 0.5
+_SHORTEST_SHOWN_S = 0.05
+
+
 class State(Record):
     """Something that can be wrong: the field that says so, and what a finding of it is (no kind: only an event)."""
 
@@ -39,10 +43,12 @@ class Episode(NamedTuple):
     text: str
     """What it was and for how long, or how often."""
     source: str
+    lasts_s: float
+    """All times together."""
 
     def finding(self) -> Finding | None:
-        """The finding that it is, None where its state is only an event."""
-        if self.state.kind is None:
+        """The finding that it is, None where its state is only an event: a blow is no vibration."""
+        if self.state.kind is None or (self.state.kind == "vibration" and self.lasts_s < _BLOW_S):
             return None
         return Finding(
             kind=self.state.kind,
@@ -72,10 +78,13 @@ def episode(
     if not spans:
         return None
     start, end = spans[0]
+    lasts_s = sum(until - since for since, until in spans)
     lasting = (
-        f" ({len(spans)} times until {log_time(spans[-1][0], 0)})" if len(spans) > 1 else f" for {end - start:.1f} s"
-    )
-    return Episode(state, start, spans[-1][1], state.means + lasting, source)
+        f" ({len(spans)} times until {log_time(spans[-1][0], 0)})" if len(spans) > 1
+        else f" for {lasts_s:.1f} s" if lasts_s >= _SHORTEST_SHOWN_S
+        else " for an instant"
+    )  # fmt: skip
+    return Episode(state, start, spans[-1][1], state.means + lasting, source, lasts_s)
 
 
 def _spans(t: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[Span]:

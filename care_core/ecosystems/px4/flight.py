@@ -151,7 +151,7 @@ class Px4Flight(RunModel):
     @cached_property
     def kills(self) -> tuple[float, ...]:
         """When the kill switch cut its motors while it was armed, as the commander says."""
-        said = (t for t, _, text in self.messages if _KILLED.search(text))
+        said = (t for t, _, text in self.messages if _KILLED.search(text) and not is_complaint(text))
         return tuple(t for t in said if any(start <= t <= end for start, end in self.armed))
 
     def parameter(self, name: str) -> float | None:

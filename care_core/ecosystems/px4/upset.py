@@ -38,6 +38,10 @@ _LIES_S = LIMITS.add("time after a fall in which it lies", 2.0, "s", "a choice: 
 _FALLING = LIMITS.add("what an accelerometer feels in a fall", 5.0, "m/s^2", "half of gravity; the air brakes the rest")
 _FALL_S = LIMITS.add("shortest fall", 0.15, "s", "half of that from half a metre; a bounce is over sooner")
 _CUT_S = LIMITS.add("time in which it falls without motors", 1.0, "s", "a choice: they stop at once")
+_HANGS_S = LIMITS.add(
+    "time in which what was cut loose leans over", 2.0, "s", "a choice: a swing on a line lasts longer"
+)
+_HANGS_DEG = LIMITS.add("how far it leans over then", 20.0, "deg", "what stands on the ground stays as it stands")
 _STILL = LIMITS.add("change of what an accelerometer feels that lies", 1.0, "m/s^2", "motors shake it by more")
 _ENDED_S = LIMITS.add("time in which it is on the ground or disarmed", 10.0, "s", "COM_DISARM_LAND: 2 s, and margin")
 _ACRO = 10
@@ -132,6 +136,16 @@ def falls_after(flight: Px4Flight, cut_s: float) -> bool | None:
         return None
     force = np.sqrt(sum(soon[name] ** 2 for name in FORCES))
     return any(end - start >= _FALL_S for start, end in flight.spans(soon.t, force < _FALLING))
+
+
+def leans_over_after(flight: Px4Flight, cut_s: float) -> bool:
+    """Whether what was upright when its motors were cut leans over without them: it falls, or hangs on a line."""
+    lean = flight.lean
+    if lean is None:
+        return False
+    after = lean.tilt_deg[(lean.t >= cut_s) & (lean.t <= cut_s + _HANGS_S)]
+    upright = len(after) > 0 and after[0] < LEFT_DEG
+    return bool(upright and np.max(after) - after[0] > _HANGS_DEG)
 
 
 def lost_control(flight: Px4Flight) -> Lost | None:

@@ -18,6 +18,9 @@ _TOPIC = "battery_status"
 READS: Wanted = {_TOPIC: ("voltage_v", "current_a", "remaining", "warning")}
 LIMITS = Limits()
 _CHARGED = LIMITS.add("charge at arming", 0.5, "of the battery", "a choice: a mission is planned with a full one")
+_DRAINED = LIMITS.add(
+    "the same, of a log that begins armed", 0.15, "of the battery", "BAT_LOW_THR: it warns from there"
+)
 _TIRED = LIMITS.add("resistance of a cell", 30.0, "mOhm", "sound lithium cells have 2 to 10; old ones 20")
 _LEAST_A = LIMITS.add("current from which it is told", 3.0, "A", "a choice: below it the voltage hardly falls")
 _LOADED_S = LIMITS.add("time after arming in which it is told", 20.0, "s", "a choice: the charge is still the same")
@@ -47,14 +50,17 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         return
     few = next(_fewer_cells(flight, table), None)
     yield from (few,) if few is not None else _ran_down(flight)
-    if not flight.arming or flight.arming[0][1]:  # nothing shows it at rest
+    if not flight.arming:
         return
     armed_s, end_s = flight.armed[0] if flight.armed else (flight.end_s, flight.end_s)
+    if flight.arming[0][1]:  # most logs begin as it is armed: its motors idle, and it draws next to nothing
+        yield from _not_charged(_at_rest(table), armed_s, _DRAINED)
+        return
     before = table.between(table.t[0], armed_s)
     if len(before) < _FEWEST:
         return
     if flight.armed or flight.was_denied:
-        yield from _not_charged(before, float(before.t[0]) if not flight.armed else armed_s)
+        yield from _not_charged(before, float(before.t[0]) if not flight.armed else armed_s, _CHARGED)
     soon = table.between(armed_s, min(armed_s + _LOADED_S, end_s))
     if len(soon):
         loaded = soon.where(soon["current_a"] > _LOADED * float(soon["current_a"].max()))
@@ -64,7 +70,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
 def _fewer_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
     """By its voltage at rest, which no pack of so many cells has that is still flown."""
     name, cells = _cells_set(flight)
-    rest = table.where((table["current_a"] < _LEAST_A) & (table.t <= table.t[0] + _BEGINS_S))
+    rest = _at_rest(table)
     if not cells or len(rest) < _FEWEST:
         return
     volts = float(median(rest["voltage_v"]))
@@ -88,6 +94,11 @@ def _fewer_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
         parameters=(name,),
         wanted=((name, float(fits[0])),),
     )
+
+
+def _at_rest(table: Table) -> Table:
+    """The first records, in which it draws next to nothing."""
+    return table.where((table["current_a"] < _LEAST_A) & (table.t <= table.t[0] + _BEGINS_S))
 
 
 def _cells_set(flight: Px4Flight) -> tuple[str, int]:
@@ -125,10 +136,11 @@ def _ran_down(flight: Px4Flight) -> Iterator[Finding]:
         return
 
 
-def _not_charged(before: Table, armed_s: float) -> Iterator[Finding]:
+def _not_charged(before: Table, armed_s: float, least: float) -> Iterator[Finding]:
     """By the firmware's own estimate of the charge."""
-    charge = float(before["remaining"][-1])
-    if 0.0 < charge < _CHARGED:
+    told = before["remaining"][before["remaining"] > 0.0]  # none at all is what an estimate knows that has not begun
+    charge = float(told[-1]) if len(told) else 1.0
+    if charge < least:
         yield Finding(
             kind="battery",
             title=UNCHARGED,

@@ -7,11 +7,14 @@ from collections.abc import Iterator
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.px4 import attitude
 from care_core.ecosystems.px4.flight import LANDED, MESSAGES, POSITION, Px4Flight, Span
-from care_core.ecosystems.px4.upset import COMBINED, FORCES, falls_after
-from care_core.logs.base import Wanted
+from care_core.ecosystems.px4.upset import COMBINED, FORCES, falls_after, leans_over_after
+from care_core.logs.base import Wanted, merge_needs
 
-READS: Wanted = {MESSAGES: ("message",), POSITION: ("z",), COMBINED: FORCES, LANDED: ("landed",)}
+READS: Wanted = merge_needs(
+    ({MESSAGES: ("message",), POSITION: ("z",), COMBINED: FORCES, LANDED: ("landed",)}, attitude.READS)
+)
 LIMITS = Limits()
 _ALOFT_M = LIMITS.add("height", 0.5, "m", "a choice: the height of a vehicle on the ground drifts by less")
 
@@ -25,7 +28,7 @@ def killed_aloft_s(flight: Px4Flight, span: Span = (-math.inf, math.inf)) -> flo
         return None
     falls = falls_after(flight, killed_s)
     is_aloft = flight.last(LANDED, "landed", killed_s) != 1 if falls is None else falls
-    return killed_s if is_aloft else None
+    return killed_s if is_aloft or leans_over_after(flight, killed_s) else None
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:

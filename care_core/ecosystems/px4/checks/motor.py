@@ -30,9 +30,13 @@ _CUT = LIMITS.add("probability that the stop made it fall", 0.9, "", "what has n
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     """The motor that gave way, or all that stopped, before control was lost in the air."""
-    lost, dropped, commands = upset.lost_control(flight), upset.hit(flight), motors.commands(flight)
+    commands, killed_s = motors.commands(flight), flight.killed_s() or math.inf
     if commands is None:
         return
+    # What is asked of motors that a switch has cut tells of no motor.
+    lost, dropped = upset.lost_control(flight), upset.hit(flight)
+    lost = None if lost is None or lost.time_s > killed_s else lost
+    dropped = None if dropped is None or dropped.falls_s > killed_s else dropped
     stopped_s = None if lost is None else _all_stopped_s(commands, lost.time_s)
     if lost is not None and stopped_s is not None:
         yield _all_stopped(flight, stopped_s, lost)
@@ -42,8 +46,10 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         upsets.append((dropped.falls_s, (0.0, 0.0)))  # what swings for long falls for another reason, later
     found = (_gave_way(flight, commands, at_s, fall) for at_s, fall in upsets)
     first = next((one for one in found if one is not None), None)
-    until_s = math.inf if lost is None else lost.time_s - _FALLS_S
-    yield from [first] if first is not None else _weak(flight, commands, until_s)
+    if first is not None:
+        yield first
+    else:
+        yield from _weak(flight, commands, min(killed_s, math.inf if lost is None else lost.time_s - _FALLS_S), lost)
 
 
 def _gave_way(flight: Px4Flight, commands: Commands, upset_s: float, fall: tuple[float, float]) -> Finding | None:
@@ -65,7 +71,7 @@ def _gave_way(flight: Px4Flight, commands: Commands, upset_s: float, fall: tuple
     )
 
 
-def _weak(flight: Px4Flight, commands: Commands, until_s: float) -> Iterator[Finding]:
+def _weak(flight: Px4Flight, commands: Commands, until_s: float, lost: upset.Lost | None) -> Iterator[Finding]:
     """A motor that came to be driven harder than all others while it flew on."""
     landed = flight.table(LANDED, "landed")
     if landed is None or not flight.hovers:
@@ -83,7 +89,7 @@ def _weak(flight: Px4Flight, commands: Commands, until_s: float) -> Iterator[Fin
         title=f"motor {weak.number}{place} lost thrust",
         onset_s=weak.since_s,
         end_s=weak.until_s,
-        severity="critical" if math.isfinite(until_s) or weak.share > _AT_LIMIT else "warning",
+        severity="critical" if lost is not None or weak.share > _AT_LIMIT else "warning",
         evidence=f"it is asked for {weak.share:.0%} where the others are at {weak.others:.0%}; before, they were even",
         source="actuator_motors or actuator_outputs",
         probability=_WEAK,
