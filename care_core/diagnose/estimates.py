@@ -47,6 +47,10 @@ UNTOLD = Estimate(
     0.3, "what no log shows lost the mission, where no model can be asked; half where a profile fits",
     "what it leads over has less than 0.3 itself", is_by_hand=True,
 )  # fmt: skip
+USED_UP = Estimate(
+    0.9, "a failsafe of the battery that is all that went wrong ended a flight that outlasted its battery",
+    "nothing else that the log shows draws a pack down", is_by_hand=True,
+)  # fmt: skip
 REFUSING = Estimate(
     0.98, "an option that the refusing check reads kept the vehicle from arming",
     "20 of 20 refused missions of the development sets (Jeffreys: 0.976, 0.88 to 1.0)",
@@ -101,6 +105,6 @@ CHANCY = Estimate(
 )  # fmt: skip
 
 ESTIMATES = (
-    MISSION_LOST_CRITICAL, MISSION_LOST_WARNING, MISSION_LOST_INFO, MISSED, UNMODELLED, UNSAID, UNTOLD, REFUSING,
-    SPOKEN_FOR, LATE, DOUBT, REPEATS, BY_CAUSES, LEARNED_WEIGHT, COST, WORTH, NECESSARY, CHANCY,
+    MISSION_LOST_CRITICAL, MISSION_LOST_WARNING, MISSION_LOST_INFO, MISSED, UNMODELLED, UNSAID, UNTOLD, USED_UP,
+    REFUSING, SPOKEN_FOR, LATE, DOUBT, REPEATS, BY_CAUSES, LEARNED_WEIGHT, COST, WORTH, NECESSARY, CHANCY,
 )  # fmt: skip

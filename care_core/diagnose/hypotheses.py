@@ -34,12 +34,14 @@ from care_core.diagnose.estimates import (
     UNMODELLED,
     UNSAID,
     UNTOLD,
+    USED_UP,
 )
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, Key, NoisyOr, What
 from care_core.diagnose.parts import is_late, set_wrong, was_refused
 from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
-from care_core.ecosystems.findings import Finding, Severity, SuspectKind
+from care_core.ecosystems.explains import EXPLAINS
+from care_core.ecosystems.findings import BATTERY_FAILSAFE, Finding, Severity, SuspectKind
 from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.run import Evidence, FitVerdict
@@ -55,6 +57,7 @@ LEAST = 0.005
 UNNAMED = "chance, or what no log shows"
 """What chance is called where there is no reference configuration that could fail as well."""
 NONE_OUTSIDE: Mapping[str, float] = MappingProxyType({})
+OUTLASTED = "the flight outlasted its battery"
 _WHAT: Mapping[SuspectKind, What] = {"hardware": "hardware", "world": "world", "operation": "world"}
 
 
@@ -123,20 +126,30 @@ def hypotheses_of(failure: NoisyOr) -> tuple[Hypothesis, ...]:
     )
 
 
+def used_up(missed: Sequence[ObjectiveResult], findings: Iterable[Finding]) -> bool:
+    """Whether all that went wrong is a failsafe of the battery, whatever else was noticed on the way."""
+    others = any(one.severity == "critical" and one.title != BATTERY_FAILSAFE for one in findings)
+    only = [one for one in missed if one.variable.name == "no_failsafe"]
+    return not others and len(missed) == len(only) == 1 and only[0].reason.startswith(BATTERY_FAILSAFE)
+
+
 def unasked(
     findings: Sequence[Finding],
     *,
-    failed: bool = False,
+    missed: Sequence[ObjectiveResult] = (),
     shown: Mapping[str, Evidence] | None = None,
     verdict: FitVerdict = "no",
     outside: Mapping[str, float] = NONE_OUTSIDE,
 ) -> tuple[Hypothesis, ...]:
     """What explains a failure of which no model can be asked; empty where nothing failed, by a check of the run
-    (`failed`) or by a critical finding. Options are those that such a finding names (`shown`, as for `explain`)."""
+    (`missed`) or by a critical finding. Options are those that such a finding names (`shown`, as for `explain`)."""
     critical = [finding for finding in findings if finding.severity == "critical"]
-    if not failed and not critical:
+    if not missed and not critical:
         return ()
     options: dict[Key, float] = {("parameter", name): share for name, share in outside.items()}
+    if used_up(missed, findings):
+        options["world", OUTLASTED] = USED_UP.value
+        findings = [one for one in findings if one.kind == "battery" or "battery" in EXPLAINS[one.kind]]
     for finding in critical:
         named = shown[finding.title].options if shown and finding.title in shown else ()
         for option in named:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from care_core.diagnose.hypotheses import OUTLASTED
 from care_core.diagnose.parts import is_pack, mend_first
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
@@ -79,10 +80,12 @@ def _named(diagnosis: Diagnosis) -> tuple[str, ...]:
     """What to look at: the part or circumstance that is likeliest, and the part that is mended before anything else."""
     part = mend_first(diagnosis.health.findings)
     first = next(iter(diagnosis.hypotheses), None)
-    leading = first.name if first is not None and first.what in ("hardware", "world") else ""
+    leading = first if first is not None and first.what in ("hardware", "world") else None
     if part is None:
-        return (leading,) if leading else ()
-    return (leading, part.title) if leading and leading != part.title and first.probability > LIKELY else (part.title,)
+        return (leading.name,) if leading is not None else ()
+    if leading is None or leading.name == part.title or leading.probability <= LIKELY:
+        return (part.title,)
+    return leading.name, part.title
 
 
 def _undone(diagnosis: Diagnosis) -> str:
@@ -91,6 +94,8 @@ def _undone(diagnosis: Diagnosis) -> str:
     part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
     if part is not None:
         return "charge or replace the battery" if is_pack(part) else ""
+    if first is not None and first.name == OUTLASTED:
+        return "land earlier, or fly with a fuller, larger or newer battery"
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
     if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"

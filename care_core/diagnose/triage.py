@@ -169,7 +169,7 @@ def _within_limits(
     missed = [result for result in judged.checks if result.status == "fault"]
     outside = suspects_outside(run, missed, health, schema, good=good) if _failed(missed, health) else ()
     weights = _weights(outside)
-    told = unasked(health.findings, failed=bool(missed), shown=said, verdict=choice.fit.verdict, outside=weights)
+    told = unasked(health.findings, missed=missed, shown=said, verdict=choice.fit.verdict, outside=weights)
     lead = leading_outside(told, outside, health.findings, run)
     fix = shown_fix(lead, run)
     return Diagnosis(
@@ -242,7 +242,7 @@ def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Di
     """The answer for a run that no profile fits: what it did and what failed, and no cause by parameters."""
     broken = tuple(result for result in judged.checks if result.status == "fault")
     outside = suspects_outside(judged.run, broken, health) if _failed(broken, health) else ()
-    told = unasked(health.findings, failed=bool(broken), outside=_weights(outside))
+    told = unasked(health.findings, missed=broken, outside=_weights(outside))
     lead = leading_outside(told, outside, health.findings, judged.run)
     return Diagnosis(
         choice,

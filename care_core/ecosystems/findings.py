@@ -134,6 +134,7 @@ NOT_FLOWN = "the vehicle never armed: no run of it is in this log"
 OWN_SUPPLY = "the autopilot's own supply"
 """What the title of a finding about the board's voltage, not the pack's, begins with."""
 UNCHARGED = "the battery was not charged"
+BATTERY_FAILSAFE = "battery failsafe"
 CAME_DOWN = "it came down and could not rise again"
 
 

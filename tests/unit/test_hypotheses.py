@@ -9,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.diagnose.estimates import UNMODELLED
-from care_core.diagnose.hypotheses import UNTOLD_BY_FIT, hypotheses_of, unasked, with_findings
+from care_core.diagnose.hypotheses import OUTLASTED, UNTOLD_BY_FIT, hypotheses_of, unasked, with_findings
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, NoisyOr
-from care_core.diagnose.records import Hypothesis
+from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.records import replace
 from care_core.run import Evidence
+from care_core.variables import Role, Threshold, Variable
 
 
 def finding(
@@ -113,9 +114,25 @@ def test_what_comes_after_the_impact_explains_nothing() -> None:
     assert lead(weigh({"LAND_SPEED": 0.6}, 0.02, [finding(0.95, after_impact=True)]))[0] == "parameter"
 
 
+def missed(name: str = "no_crash", reason: str = "") -> ObjectiveResult:
+    check = Variable(name, Role.OBJECTIVE, "bool", kind="functional", threshold=Threshold("==", 1))
+    return ObjectiveResult(check, 0.0, check.threshold, "fault", reason)
+
+
+def test_a_pack_that_a_flight_outlasts_needs_no_part_that_failed() -> None:
+    failsafe, compass = (
+        missed("no_failsafe", "battery failsafe at 234.6 s"),
+        replace(finding(0.9, "warning"), kind="compass", title="compass 2 is disturbed"),
+    )
+    assert lead(unasked([compass], missed=(failsafe,))) == ("world", OUTLASTED)
+    assert lead(unasked([compass], missed=(failsafe, missed())))[0] == "hardware"
+    motor = finding(0.9)
+    assert lead(unasked([motor], missed=(failsafe,)))[0] == "hardware"
+
+
 def test_without_a_model_only_a_failure_is_explained() -> None:
     assert unasked([finding(0.9, "warning")]) == ()
-    assert lead(unasked([finding(0.9, "warning")], failed=True))[0] == "hardware"
+    assert lead(unasked([finding(0.9, "warning")], missed=(missed(),)))[0] == "hardware"
     assert lead(unasked([finding(0.9)])) == ("hardware", "motor 2 lost thrust")
 
 

@@ -13,7 +13,6 @@ from care_core.logs.base import Table
 from care_core.records import Record
 from care_core.text import log_time
 
-
 _BLOW_S = 0.5
 _SHORTEST_SHOWN_S = 0.05
 
@@ -77,7 +76,7 @@ def episode(
     ]
     if not spans:
         return None
-    start, end = spans[0]
+    start = spans[0][0]
     lasts_s = sum(until - since for since, until in spans)
     lasting = (
         f" ({len(spans)} times until {log_time(spans[-1][0], 0)})" if len(spans) > 1

@@ -17,7 +17,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import OWN_SUPPLY, UNCHARGED, Finding, Severity
+from care_core.ecosystems.findings import BATTERY_FAILSAFE, OWN_SUPPLY, UNCHARGED, Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median
 from care_core.text import log_time
@@ -121,7 +121,7 @@ def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: f
     asks += "" if rest is None or is_full else f"; not full before take-off: {rest / cells:.2f} V a cell"
     return Finding(
         kind="battery",
-        title="battery failsafe",
+        title=BATTERY_FAILSAFE,
         onset_s=failsafe,
         end_s=flight.end_s,
         severity="critical",

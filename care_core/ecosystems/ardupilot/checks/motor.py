@@ -54,6 +54,7 @@ _STAYS = LIMITS.add("share of the rest of the flight", 0.7, "", "a choice: a wea
 _LASTS_S = LIMITS.add("shortest excess", 4.0, "s", "a choice: a turn is over sooner")
 _TRYING_S = LIMITS.add("first seconds of trying to lift", 12.0, "s", "a choice: then integrators wind up")
 _LIFTING = LIMITS.add("output that lifts", 0.2, "of the range", "a choice: armed motors idle below it")
+_TRIES = LIMITS.add("throttle that tries to lift", 0.1, "of the range", "a choice: MOT_SPIN_MIN is 0.15 as shipped")
 _HOVERS_MS = LIMITS.add("speed at which a QuadPlane hovers", 6.0, "m/s", "a choice: faster, its wing lifts part of it")
 _UPRIGHT_DEG = LIMITS.add("lean of what still flies", 60.0, "deg", "a choice: beyond it motors are told to right it")
 _CALM_DEG = LIMITS.add("attitude error before control was lost", 12.0, "deg", "a choice: what drifts off lost no motor")
@@ -178,6 +179,8 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
         lifting &= np.interp(t, *tilt) < _UPRIGHT_DEG
     if flight.flown:
         return lifting & during(flight.flown, t)
+    if (throttle := flight.throttle) is not None:  # what idles winds up its integrators against the ground
+        lifting &= np.interp(t, *throttle) > _TRIES
     return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting
 
 

@@ -30,8 +30,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     motors, moved = flight.tables(READS).get(_MOTORS), flight.table(POSITION, "vx", "vy", "heading")
     if motors is None or moved is None or not len(motors) or len(moved) < 3:
         return
-    driven = np.max([np.abs(np.nan_to_num(column)) for name, column in motors.columns.items() if name in READS[_MOTORS]],
-                    axis=0)  # fmt: skip
+    outputs = [column for name, column in motors.columns.items() if name in READS[_MOTORS]]
+    driven = np.max(np.abs(np.nan_to_num(outputs)), axis=0)
     speed = np.hypot(moved["vx"], moved["vy"])
     turn = np.abs(np.degrees(np.gradient(np.unwrap(np.nan_to_num(moved["heading"])), moved.t)))
     stands = (speed < _STANDS_MS) & (turn < _TURNS_DPS) & (np.interp(moved.t, motors.t, driven) > _DRIVEN)

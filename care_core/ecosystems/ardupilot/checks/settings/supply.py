@@ -16,7 +16,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.battery import FULL_V, Battery
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import BATTERY_FAILSAFE, Finding
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median
 from care_core.records import Record
@@ -81,7 +81,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     if acted is not None:
         yield Finding(
             kind="battery",
-            title="battery failsafe",
+            title=BATTERY_FAILSAFE,
             onset_s=acted.time_s,
             end_s=flight.end_s,
             severity="critical",
