@@ -53,8 +53,10 @@ _CLIMBS_M = 20.0
 """A copter that has hit the ground cannot climb so far, whatever its estimator reports."""
 _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
-_SHOCK = 30.0
-"""m/s^2: three times gravity is no flight."""
+_SHOCK, _HARD = 30.0, 5.0
+"""m/s^2: three times gravity is no flight, and so many times that is no motor that broke."""
+_STOPS_S, _MOVES_MS, _STOPPED = 0.8, 2.5, 0.3
+"""What is stopped by a blow has less than this share of its speed so shortly after; a copter that brakes takes longer."""
 HIT_MS = 3.0
 """Speed of a fall from half a metre: LAND_SPEED is at most 2 m/s, a simulated landing says "SIM Hit ground at 0.5"."""
 _BEFORE_HIT_S, _SWAYS_S, _BLOW = 1.0, 0.2, 2.0
@@ -425,12 +427,38 @@ class Airborne(Armed):
         return float(t[low][0]) if low.any() else None
 
     @cached_property
-    def was_struck(self) -> bool:
-        """Whether a blow came before control was lost: it hit something while its attitude was still followed."""
-        lost, shock = self.lost_control_s, None
-        if lost is not None:
-            shock = self.shock_after(lost - _STRUCK_S)
-        return lost is not None and shock is not None and shock < lost
+    def struck_s(self) -> float | None:
+        """When it hit something before control was lost: by a blow just before, or one that stopped it or that nothing
+        in flight comes near; None where no blow did."""
+        lost = self.lost_control_s
+        if lost is None:
+            return None
+        blows = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost]
+        hard = (t for t, felt in blows if t >= lost - _STRUCK_S or felt > _HARD * _SHOCK or self._stops_at(t))
+        return min(hard, default=None)
+
+    def _blows(self) -> Iterator[tuple[float, float]]:
+        """Each time in the air that it was shaken beyond what flight does, and by how much, m/s^2; of a sensor whose
+        range that exceeded, the least that it was."""
+        table = self.one("IMU", "AccX", "AccY", "AccZ")
+        if table is not None:
+            felt = np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
+            shaken = (felt > _SHOCK) & during(self.airborne, table.t)
+            yield from zip(table.t[shaken].tolist(), felt[shaken].tolist(), strict=True)
+        for one in self.all("VIBE", "Clip"):
+            clipped = np.append(False, np.diff(one["Clip"]) > 0) & during(self.airborne, one.t)
+            yield from ((t, _SHOCK) for t in one.t[clipped].tolist())
+
+    def _stops_at(self, at: float) -> bool:
+        """Whether it moved over ground until a time, and stood just after it."""
+        moved = self.one("GPS", "Spd")
+        if moved is None:
+            return False
+        before = moved["Spd"][(moved.t > at - _STOPS_S) & (moved.t <= at)]
+        after = moved["Spd"][(moved.t > at) & (moved.t < at + _STOPS_S)]
+        if not len(before) or not len(after):
+            return False
+        return float(before[-1]) > _MOVES_MS and float(np.min(after)) < _STOPPED * float(before[-1])
 
 
 def _first_above(series: tuple[Floats, Floats] | None, least: float, start: float, end: float) -> float | None:

@@ -53,14 +53,14 @@ def find(flight: Flight) -> Iterator[Finding]:
             suspect="operation",
         )
     elif told is not None or said is not None or impact is not None:
-        first = min(t for t in (told, said, impact) if t is not None)
+        first = min(t for t in (told, said, impact, flight.struck_s) if t is not None)
         steered = _steered(flight, first)
         is_said = told is not None or said is not None
         shown = (
             "the firmware says: crash" if is_said else "control was lost, and it came down" if lost is not None else "",
             "" if flight.hit is None else flight.hit.said,
             steered,
-            "a blow came before control was lost" if flight.was_struck else "",
+            "a blow came before control was lost" if flight.struck_s is not None else "",
         )
         yield Finding(
             kind="crash",
@@ -78,7 +78,7 @@ def find(flight: Flight) -> Iterator[Finding]:
 def _what(flight: Flight, steered: str) -> str:
     if steered:
         return "it flew into the ground as steered"
-    if flight.was_struck:
+    if flight.struck_s is not None:
         return "it hit something"
     return "it crashed" if flight.hit is None else f"it hit the ground at {flight.hit.speed_ms:.1f} m/s"
 

@@ -279,7 +279,13 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     """Control was lost towards a motor that was asked for more than the others, at or near its limit."""
     lost = flight.lost_control_s
     table = flight.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
-    if lost is None or table is None or not flight.airborne or flight.was_struck or not _was_calm(flight, lost):
+    if (
+        lost is None
+        or table is None
+        or not flight.airborne
+        or flight.struck_s is not None
+        or not _was_calm(flight, lost)
+    ):
         return
     rows = (table.t >= lost - 0.3) & (table.t <= lost + _FALL_S)
     if not rows.any():
@@ -319,7 +325,13 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
 def _driven_hardest(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     """The motor that was driven hardest, alone, just before control was lost, and was the first near its limit."""
     lost, table = flight.lost_control_s, flight.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
-    if lost is None or table is None or not flight.airborne or flight.was_struck or not _was_calm(flight, lost):
+    if (
+        lost is None
+        or table is None
+        or not flight.airborne
+        or flight.struck_s is not None
+        or not _was_calm(flight, lost)
+    ):
         return
     rows = (table.t >= lost) & (table.t <= lost + _LEANS_S)
     around = np.abs(outputs.t - lost) < _FALL_S + _WINDOW_S

@@ -85,6 +85,8 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
         calm &= ~((table.t >= start) & (table.t < start + _SPIN_UP_S)) | (end - start < 3 * _SPIN_UP_S)
     if flight.is_winged:  # wheels on grass, a catapult, a belly landing
         calm &= during(((start + _SPIN_UP_S, end - _SPIN_UP_S) for start, end in flight.flown), table.t)
+    if (struck_s := flight.struck_s) is not None:  # what it hit shakes it
+        calm &= table.t < struck_s
     t = table.t[calm]
     if len(t) < 3:
         return None
