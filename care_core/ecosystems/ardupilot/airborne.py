@@ -56,7 +56,7 @@ _STRUCK_S = 1.0
 _SHOCK, _HARD = 30.0, 5.0
 """m/s^2: three times gravity is no flight, and so many times that is no motor that broke."""
 _STOPS_S, _MOVES_MS, _STOPPED = 0.8, 2.5, 0.3
-"""What is stopped by a blow has less than this share of its speed so shortly after; a copter that brakes takes longer."""
+"""What a blow stops has less than this share of its speed so shortly after; a copter that brakes takes longer."""
 HIT_MS = 3.0
 """Speed of a fall from half a metre: LAND_SPEED is at most 2 m/s, a simulated landing says "SIM Hit ground at 0.5"."""
 _BEFORE_HIT_S, _SWAYS_S, _BLOW = 1.0, 0.2, 2.0

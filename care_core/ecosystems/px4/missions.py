@@ -12,6 +12,8 @@ from care_core.ecosystems.coverage import SUM, Samples, doubt
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric
 from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.checks.kill_switch import killed_aloft_s
+from care_core.ecosystems.px4.failsafes import READS as FAILSAFES
+from care_core.ecosystems.px4.failsafes import in_words
 from care_core.ecosystems.px4.flight import (
     AIRBORNE_M,
     BARELY_M,
@@ -29,7 +31,7 @@ from care_core.ecosystems.px4.measures.flown import NEEDS, is_armed, span_of_pha
 from care_core.ecosystems.px4.measures.outcome import failsafe_s, flew_automatically, halted, lost_s
 from care_core.ecosystems.px4.measures.shortfall import evidence, shortfall
 from care_core.ecosystems.vehicles import mode_name, way_of
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.records import replace
 from care_core.run import Check, Evidence, Unavailable, Value
 from care_core.text import log_time
@@ -49,7 +51,7 @@ class Px4Missions(MissionKind):
     args: Mapping[str, str] = {"tolerance_m": numeric("how far from where the mission ends a landing may be")}
 
     def needs(self, spec: Args) -> Wanted:
-        return NEEDS
+        return merge_needs((NEEDS, FAILSAFES))
 
     def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
         flight = _flight(model)
@@ -111,7 +113,8 @@ def _checks(flight: Px4Flight, span: Span, *, ended: bool) -> Iterator[Check]:
     no_crash = _no_crash(flight, span)
     yield replace(no_crash, value=silent) if no_crash.value == 1.0 else no_crash
     failsafe_s = flight.first_s(STATUS, "failsafe", 1, span)
-    acted = "" if failsafe_s is None else f"a failsafe acted at {log_time(failsafe_s)}"
+    about = "" if failsafe_s is None else in_words(flight, failsafe_s) or "a"
+    acted = "" if failsafe_s is None else f"{about} failsafe at {log_time(failsafe_s)}"
     yield Check("no_failsafe", 0.0 if acted else silent, "no failsafe acted", acted)
     if flies:
         landed = _on_ground(flight, span, ended=ended)

@@ -54,7 +54,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         return
     armed_s, end_s = flight.armed[0] if flight.armed else (flight.end_s, flight.end_s)
     if flight.arming[0][1]:  # most logs begin as it is armed: its motors idle, and it draws next to nothing
-        yield from _not_charged(_at_rest(table), armed_s, _DRAINED)
+        yield from _not_charged(_at_rest(table), armed_s, _CHARGED if _was_warned(flight) else _DRAINED)
         return
     before = table.between(table.t[0], armed_s)
     if len(before) < _FEWEST:
@@ -134,6 +134,12 @@ def _ran_down(flight: Px4Flight) -> Iterator[Finding]:
             mission_lost=_RAN_LOSES,
         )
         return
+
+
+def _was_warned(flight: Px4Flight) -> bool:
+    """Whether the firmware found its charge low while it was armed."""
+    table = flight.table(_TOPIC, "warning")
+    return table is not None and any(bool(np.any(table.between(*span)["warning"] > 0)) for span in flight.armed)
 
 
 def _not_charged(before: Table, armed_s: float, least: float) -> Iterator[Finding]:

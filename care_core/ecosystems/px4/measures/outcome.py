@@ -8,8 +8,8 @@ import numpy as np
 
 from care_core.ecosystems.coverage import SUM, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
-from care_core.ecosystems.px4 import upset
-from care_core.ecosystems.px4.flight import FLAGS, MESSAGES, RESULT, STATUS
+from care_core.ecosystems.px4 import failsafes, upset
+from care_core.ecosystems.px4.flight import MESSAGES, RESULT, STATUS
 from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.px4.measures.flown import NEEDS, NOT_FLOWN, flight_of, flown_mission, is_armed
 from care_core.ecosystems.px4.measures.route import landing_error
@@ -26,21 +26,8 @@ TAKEOFF_S = 120.0
 """Longer than any take-off takes: the mission does not go on."""
 CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 
-_REASONS = {
-    "battery": ("battery_warning", "battery_unhealthy", "battery_low_remaining_time"),
-    "geofence": ("geofence_breached",),
-    "position": ("local_position_invalid", "global_position_invalid", "local_velocity_invalid"),
-    "attitude": ("attitude_invalid", "angular_velocity_invalid", "fd_critical_failure"),
-    "motor": ("fd_motor_failure", "fd_esc_arming_failure", "fd_imbalanced_prop"),
-    "link": ("manual_control_signal_lost", "gcs_connection_lost", "offboard_control_signal_lost"),
-    "mission": ("mission_failure",),
-    "wind": ("wind_limit_exceeded",),
-}
-"""What a failsafe is about: the flags of failsafe_flags (FailsafeFlags.msg) that are up while it acts."""
-_LEAST_WARNING = {"battery_warning": 2}
-"""battery_warning counts from critical on (battery_status.msg); the others are true or false."""
 _EVENTS: Wanted = merge_needs((
-    NEEDS, upset.READS, {FLAGS: tuple(flag for flags in _REASONS.values() for flag in flags), MESSAGES: ("message",)},
+    NEEDS, upset.READS, failsafes.READS, {MESSAGES: ("message",)},
 ))  # fmt: skip
 
 
@@ -61,12 +48,7 @@ def reasons_of_failsafe(mission: Mission) -> tuple[str, ...]:
     acted_s = failsafe_s(mission)
     if acted_s is None:
         return ()
-    flight, near = flight_of(mission), (acted_s - 1.0, acted_s + 1.0)
-    return tuple(
-        about
-        for about, flags in _REASONS.items()
-        if any(flight.at_least(FLAGS, flag, _LEAST_WARNING.get(flag, 1), near) for flag in flags)
-    )
+    return failsafes.reasons(flight_of(mission), acted_s)
 
 
 def lost_s(mission: Mission) -> float | None:
@@ -137,8 +119,10 @@ def _flown_whole(mission: Mission) -> Value:
     return float(off_m <= float(mission.spec.get("tolerance_m", TOLERANCE_M))) if is_known(off_m) else off_m
 
 
-@extractor("px4_failsafe", needs=_EVENTS, unit="", args={"about": one_of(", ".join(_REASONS), *_REASONS)},
-           rests_on=everything)  # fmt: skip
+_ABOUT = one_of(", ".join(failsafes.REASONS), *failsafes.REASONS)
+
+
+@extractor("px4_failsafe", needs=_EVENTS, unit="", args={"about": _ABOUT}, rests_on=everything)
 def failsafe(mission: Mission, args: Args) -> Value:
     """1 when a failsafe acted in flight, of what `about` names or of any kind, else 0."""
     if not is_armed(mission):

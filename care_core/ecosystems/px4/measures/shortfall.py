@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 from care_core.ecosystems.measures import Mission
 from care_core.ecosystems.px4 import upset
+from care_core.ecosystems.px4.failsafes import in_words
 from care_core.ecosystems.px4.measures.flown import flight_of, flown_mission, is_armed
-from care_core.ecosystems.px4.measures.outcome import TOLERANCE_M, failsafe_s, halted, lost_s, reasons_of_failsafe
+from care_core.ecosystems.px4.measures.outcome import TOLERANCE_M, failsafe_s, halted, lost_s
 from care_core.ecosystems.px4.measures.route import landing_error
 from care_core.run import Evidence, Unavailable, is_known
 from care_core.text import log_time
@@ -70,5 +71,5 @@ def _clauses(mission: Mission) -> Iterator[str]:
         yield halt[1]
     acted_s = failsafe_s(mission)
     if acted_s is not None:
-        about = " and ".join(reasons_of_failsafe(mission))
+        about = in_words(flight, acted_s)
         yield f"{f'the {about} ' if about else 'a '}failsafe acted at {log_time(acted_s)}"
