@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from care_core.ecosystems.findings import every_finding
@@ -70,6 +71,14 @@ def test_a_flight_that_the_firmware_ended_in_the_air() -> None:
     found = checked(vehicle_status=TERMINATED, vehicle_local_position=heights(6.0))
     assert found["no_crash"] == (0.0, "the firmware cut its motors in the air at 40.0 s, 6.0 m up")
     assert found["no_failsafe"] == (0.0, "a failsafe acted at 40.0 s")
+
+
+def test_a_failsafe_is_told_by_what_it_is_about() -> None:
+    flags = states(offboard_control_signal_lost=[(0, 0), (39.9, 1)], battery_warning=[(0, 0), (45, 1)])
+    found = checked(vehicle_status=TERMINATED, failsafe_flags=flags)
+    assert found["no_failsafe"] == (0.0, "offboard link failsafe at 40.0 s")
+    cut = Table(np.array([30.0]), {"level": np.array(["INFO"]), "message": np.array(["Kill engaged"])})
+    assert checked(vehicle_status=TERMINATED, failsafe_flags=flags, logged_messages=cut)["no_failsafe"][0] == 1.0
 
 
 def test_one_that_it_ended_on_the_ground_has_not_crashed() -> None:

@@ -112,14 +112,27 @@ def _checks(flight: Px4Flight, span: Span, *, ended: bool) -> Iterator[Check]:
     silent: Value = _lost_events(flight, span) or 1.0
     no_crash = _no_crash(flight, span)
     yield replace(no_crash, value=silent) if no_crash.value == 1.0 else no_crash
-    failsafe_s = flight.first_s(STATUS, "failsafe", 1, span)
-    about = "" if failsafe_s is None else in_words(flight, failsafe_s) or "a"
-    acted = "" if failsafe_s is None else f"{about} failsafe at {log_time(failsafe_s)}"
+    acted = _failsafe(flight, _before_kill(flight, span))
     yield Check("no_failsafe", 0.0 if acted else silent, "no failsafe acted", acted)
     if flies:
         landed = _on_ground(flight, span, ended=ended)
         yield Check("landed", landed, "it was on the ground at the end", "it was disarmed in the air")
     yield Check("disarmed", 1.0 if ended else _CUT, "it was disarmed at the end")
+
+
+def _before_kill(flight: Px4Flight, span: Span) -> Span:
+    """A span until its kill switch: what acts on a vehicle that somebody cut says nothing of its flight."""
+    killed_s = flight.killed_s(span)
+    return span if killed_s is None else (span[0], killed_s)
+
+
+def _failsafe(flight: Px4Flight, span: Span) -> str:
+    """The first failsafe of a span in words, empty where none acted."""
+    acted_s = flight.first_s(STATUS, "failsafe", 1, span)
+    if acted_s is None:
+        return ""
+    about = in_words(flight, acted_s)
+    return f"{about} failsafe at {log_time(acted_s)}" if about else f"a failsafe acted at {log_time(acted_s)}"
 
 
 def _lost_events(flight: Px4Flight, span: Span) -> Unavailable | None:
@@ -130,8 +143,7 @@ def _lost_events(flight: Px4Flight, span: Span) -> Unavailable | None:
 
 def _no_crash(flight: Px4Flight, span: Span) -> Check:
     """Whether it stayed in control. What falls after its motors were cut is no failure of its own."""
-    killed_s = flight.killed_s(span)
-    before = (span[0], min(span[1], math.inf if killed_s is None else killed_s))
+    before = _before_kill(flight, span)
     detected_s, ended_s = flight.detected_s(before), flight.terminated_s(before)
     was_cut = detected_s is None and ended_s is None and killed_aloft_s(flight, span) is not None
     hit, lost = upset.hit(flight), upset.lost_control(flight)

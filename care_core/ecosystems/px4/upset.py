@@ -41,7 +41,6 @@ _CUT_S = LIMITS.add("time in which it falls without motors", 1.0, "s", "a choice
 _HANGS_S = LIMITS.add(
     "time in which what was cut loose leans over", 2.0, "s", "a choice: a swing on a line lasts longer"
 )
-_HANGS_DEG = LIMITS.add("how far it leans over then", 20.0, "deg", "what stands on the ground stays as it stands")
 _STILL = LIMITS.add("change of what an accelerometer feels that lies", 1.0, "m/s^2", "motors shake it by more")
 _ENDED_S = LIMITS.add("time in which it is on the ground or disarmed", 10.0, "s", "COM_DISARM_LAND: 2 s, and margin")
 _ACRO = 10
@@ -138,14 +137,12 @@ def falls_after(flight: Px4Flight, cut_s: float) -> bool | None:
     return any(end - start >= _FALL_S for start, end in flight.spans(soon.t, force < _FALLING))
 
 
-def leans_over_after(flight: Px4Flight, cut_s: float) -> bool:
-    """Whether what was upright when its motors were cut leans over without them: it falls, or hangs on a line."""
+def leans_over_deg(flight: Px4Flight, cut_s: float) -> float | None:
+    """How far what was upright when its motors were cut leans over without them, as it falls or hangs on a line; None
+    where the log does not tell, or where it lay already."""
     lean = flight.lean
-    if lean is None:
-        return False
-    after = lean.tilt_deg[(lean.t >= cut_s) & (lean.t <= cut_s + _HANGS_S)]
-    upright = len(after) > 0 and after[0] < LEFT_DEG
-    return bool(upright and np.max(after) - after[0] > _HANGS_DEG)
+    after = np.empty(0) if lean is None else lean.tilt_deg[(lean.t >= cut_s) & (lean.t <= cut_s + _HANGS_S)]
+    return float(np.max(after) - after[0]) if len(after) and after[0] < LEFT_DEG else None
 
 
 def lost_control(flight: Px4Flight) -> Lost | None:

@@ -1,0 +1,52 @@
+"""What a failsafe is about: the flags of failsafe_flags (FailsafeFlags.msg) that are up as it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from care_core.ecosystems.px4.flight import FLAGS, Px4Flight
+from care_core.logs.base import Wanted
+
+REASONS: Mapping[str, tuple[str, ...]] = {
+    "battery": ("battery_warning", "battery_unhealthy", "battery_low_remaining_time"),
+    "geofence": ("geofence_breached",),
+    "position": ("local_position_invalid", "global_position_invalid", "local_velocity_invalid"),
+    "attitude": ("attitude_invalid", "angular_velocity_invalid", "fd_critical_failure"),
+    "motor": ("fd_motor_failure", "fd_esc_arming_failure", "fd_imbalanced_prop"),
+    "link": ("manual_control_signal_lost", "gcs_connection_lost", "offboard_control_signal_lost"),
+    "mission": ("mission_failure",),
+    "wind": ("wind_limit_exceeded",),
+}
+READS: Wanted = {FLAGS: tuple(flag for flags in REASONS.values() for flag in flags)}
+
+_CRITICAL_WARNING = {"battery_warning": 2}
+"""battery_warning counts from critical on (battery_status.msg); the others are true or false."""
+_NEAR_S, _ROSE_S = 1.0, 0.3
+"""A failsafe acts within a second of its reason; what it is told by rose just before."""
+_LINKS = {
+    "manual_control_signal_lost": "radio",
+    "gcs_connection_lost": "ground station",
+    "offboard_control_signal_lost": "offboard link",
+}
+
+
+def reasons(flight: Px4Flight, acted_s: float) -> tuple[str, ...]:
+    """What a failsafe was about that acted at a time."""
+    near = (acted_s - _NEAR_S, acted_s + _NEAR_S)
+    return tuple(
+        about
+        for about, flags in REASONS.items()
+        if any(flight.at_least(FLAGS, flag, _CRITICAL_WARNING.get(flag, 1), near) for flag in flags)
+    )
+
+
+def in_words(flight: Px4Flight, acted_s: float) -> str:
+    """The same in a word or two: by the flags that rose with it, else by those that were up; empty where none was."""
+    rose = tuple(
+        flag
+        for flags in REASONS.values()
+        for flag in flags
+        if any(value > 0 and abs(t - acted_s) < _ROSE_S for t, value in flight.changes(FLAGS, flag))
+    )
+    words = [_LINKS.get(flag) or next(about for about, flags in REASONS.items() if flag in flags) for flag in rose]
+    return " and ".join(dict.fromkeys(words or reasons(flight, acted_s)))
