@@ -128,7 +128,7 @@ def hypotheses_of(failure: NoisyOr) -> tuple[Hypothesis, ...]:
 
 def used_up(missed: Sequence[ObjectiveResult], findings: Iterable[Finding]) -> bool:
     """Whether all that went wrong is a failsafe of the battery, whatever else was noticed on the way."""
-    others = any(one.severity == "critical" and one.title != BATTERY_FAILSAFE for one in findings)
+    others = any(one.severity == "critical" and (one.title != BATTERY_FAILSAFE or one.parameters) for one in findings)
     only = [one for one in missed if one.variable.name == "no_failsafe"]
     return not others and len(missed) == len(only) == 1 and only[0].reason.startswith(BATTERY_FAILSAFE)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from care_core.ecosystems.findings import CAME_DOWN, OWN_SUPPLY, UNCHARGED, Finding, every_finding
+from care_core.ecosystems.findings import CAME_DOWN, NO_BATTERY, OWN_SUPPLY, UNCHARGED, Finding, every_finding
 from care_core.ecosystems.ranking import LIKELY
 from care_core.text import log_time
 
@@ -80,7 +80,7 @@ def _stops(finding: Finding) -> bool:
 
 def is_pack(part: Finding) -> bool:
     """Whether a part that failed is the battery itself, which is charged or replaced."""
-    return part.kind in ("battery", "prearm") and not part.title.startswith(OWN_SUPPLY)
+    return part.kind in ("battery", "prearm") and not part.title.startswith((OWN_SUPPLY, NO_BATTERY))
 
 
 def unmended(part: Finding) -> str:

@@ -101,7 +101,9 @@ def clock_doubt(dictionary: Dictionary, tables: Mapping[str, Table], start_s: fl
 def _satellites_pace(dictionary: Dictionary, gps: Table | None, start_s: float, end_s: float) -> float:
     """Seconds by the satellites' time (`GMS`, ms of the week) in one of the log's; 1 where nothing tells."""
     said, true = _satellites(dictionary, gps, start_s, end_s)
-    true_s, said_s = np.diff(true), np.diff(said)
+    fresh = np.append(True, np.diff(true) != 0) if len(true) else np.empty(0, dtype=bool)
+    # A receiver without a fix may repeat its time, and has caught up with the next that is another.
+    true_s, said_s = np.diff(true[fresh]), np.diff(said[fresh])
     steady = (true_s > 0) & (true_s < _GPS_STEP_S)  # a new week, a receiver that found the time
     if steady.sum() < _ENOUGH or said_s[steady].sum() <= 0:
         return 1.0

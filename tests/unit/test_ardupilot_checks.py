@@ -13,7 +13,7 @@ from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.ardupilot.spans import runs
-from care_core.ecosystems.findings import Finding, every_finding
+from care_core.ecosystems.findings import NO_BATTERY, Finding, every_finding
 from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
@@ -439,6 +439,15 @@ def test_a_failsafe_above_what_a_battery_needs_is_a_parameter() -> None:
     finding = first(made)
     assert (finding.kind, finding.suspect) == ("battery", "parameter")
     assert "BATT_LOW_VOLT=11.9" in finding.evidence
+
+
+def test_a_failsafe_of_a_monitor_that_measures_nothing_blames_no_threshold() -> None:
+    made = Made()
+    made.settings["BATT_LOW_VOLT"] = 9.0
+    made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
+    made.table["BAT"]["Volt"][:] = 3.248
+    finding = first(made)
+    assert (finding.title, finding.parameters) == (NO_BATTERY, ())
 
 
 def test_of_a_battery_that_was_not_full_it_is_none() -> None:

@@ -99,6 +99,12 @@ def test_a_pause_or_what_was_held_up_is_no_clock_that_was_set(t: Floats, own: Fl
     assert set_forward(t, own) is None
 
 
+def test_a_receiver_that_repeats_its_time_without_a_fix_makes_no_clock_wrong() -> None:
+    stood = np.where((T > 2) & (T < 34), 2.0, T)  # and has caught up after it
+    assert clock_doubt(MESSAGES, satellites(T, stood), 0, 100) == ""
+    assert "2 s pass in each" in clock_doubt(MESSAGES, satellites(T, 2 * T), 0, 100)
+
+
 def test_one_topic_that_was_held_up_to_the_end_sets_no_clock() -> None:
     topics = {"/odom": Table(SET, {"header.stamp": T}), "/scan": Table(SET, {"header.stamp": SET})}
     assert clock_doubt(MESSAGES, topics, 0, 100) == ""

@@ -240,6 +240,12 @@ def test_a_battery_that_is_low_is_the_reason_itself() -> None:
     assert "check it first" in level.evidence
 
 
+def test_a_monitor_is_never_switched_off_for_want_of_a_battery() -> None:
+    text = "Battery 1 low voltage failsafe"
+    assert refused_at(0.8, (text,), {"BATT_MONITOR": (4, 0), "BATT_LOW_VOLT": (10.5, 0)}).parameters == ()
+    assert refused_at(0.8, (text,), {"BATT_MONITOR": (11, 4), "BATT_LOW_VOLT": (10.5, 10.5)}).parameters
+
+
 def test_a_compass_beside_a_parameter_that_cannot_hold_is_not_called_wrong() -> None:
     made = Made()
     del made.rows["ARM"]

@@ -17,7 +17,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import BATTERY_FAILSAFE, OWN_SUPPLY, UNCHARGED, Finding, Severity
+from care_core.ecosystems.findings import BATTERY_FAILSAFE, NO_BATTERY, OWN_SUPPLY, UNCHARGED, Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median
 from care_core.text import log_time
@@ -34,7 +34,6 @@ CRITICAL = LIMITS.add("critical level of a cell", 3.3, "V", _ADVICE)
 RUINOUS = LIMITS.add("level that harms a cell", 3.0, "V", _CELLS)
 _LASTS_S = LIMITS.add("shortest sag", 2.0, "s", "a choice: a burst of throttle is over sooner")
 _EARLY_V = LIMITS.add("failsafe above the usual low level by", 0.05, "V", "a choice: voltages are set to a tenth")
-_ALIVE_V = LIMITS.add("voltage that drives a vehicle", 4.0, "V", "one full cell")
 _DRAWS_A = LIMITS.add("current that is drawn", 0.5, "A", "a choice: monitors are off by less")
 _BOARD_V = LIMITS.add("supply of the board", 4.3, "V", "ArduPilot, Power module and brown-outs")
 _BOARD_LEAST_V = LIMITS.add("supply that is measured", 0.5, "V", "a choice: below it nothing measures")
@@ -49,6 +48,7 @@ _CALIBRATION = calibrated(
 _DEEP = LIMITS.add("probability of a pack that sags deep", 0.4, "", "a choice: a weak pack, or a full throttle")
 _SAGS = LIMITS.add("probability of a pack that sags", 0.25, "", "a choice: most packs do at the end of a flight")
 _FAILSAFE = LIMITS.add("probability of a bad pack, failsafe alone", 0.1, "", "a choice: mostly a flight too long")
+_NOTHING = LIMITS.add("probability of a monitor that measures nothing", 0.95, "", "the vehicle flew on")
 _MONITOR = LIMITS.add("probability of a monitor not calibrated", 0.3, "", "a choice: it harms failsafes only")
 _BOARD = LIMITS.add("probability of a weak board supply", 0.7, "", "a choice: below 4.3 V the board may restart")
 
@@ -56,7 +56,8 @@ _BOARD = LIMITS.add("probability of a weak board supply", 0.7, "", "a choice: be
 def find(flight: Flight) -> Iterator[Finding]:
     """What is wrong with the supply. A voltage that is measured wrongly says nothing of the pack."""
     for battery in () if supply.wrong_scale(flight) else flight.batteries[:1]:
-        yield from _monitor(flight, battery.table)
+        nothing = _of_no_battery(flight, battery.table)
+        yield from _monitor(flight, battery.table) if nothing is None else (nothing,)
         alive = within_reason(battery.table)
         if len(alive) >= 3 and np.ptp(alive["Volt"]) > 0:
             yield from _pack(flight, battery, alive)
@@ -132,6 +133,24 @@ def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: f
     )
 
 
+def _of_no_battery(flight: Flight, table: Table) -> Finding | None:
+    """A failsafe of a monitor that measures nothing of the battery."""
+    failsafe = flight.battery_failsafe_s
+    volts = 0.0 if failsafe is None or not len(table) else float(np.interp(failsafe, table.t, table["Volt"]))
+    if failsafe is None or not 0.0 < volts < supply.DRIVES_V:
+        return None
+    return Finding(
+        kind="battery",
+        title=NO_BATTERY,
+        onset_s=failsafe,
+        end_s=flight.end_s,
+        severity="critical",
+        evidence=f"{volts:.1f} V drive no vehicle: look at its wiring and its pin; the thresholds are not to blame",
+        source="BAT.Volt; battery failsafe",
+        probability=_NOTHING,
+    )
+
+
 def _and_failsafe(failsafe: float | None) -> str:
     return "" if failsafe is None else f"; battery failsafe at {log_time(failsafe)}"
 
@@ -156,7 +175,7 @@ def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
     odd = ""
     if np.ptp(known) == 0:
         odd = f"the voltage stays at {known[0]:.2f} V in flight"
-    elif float(median(known)) < _ALIVE_V:
+    elif float(median(known)) < supply.DRIVES_V:
         odd = f"{median(known):.2f} V drive no vehicle: nothing is connected to it, or its scale is wrong"
     elif len(amps) and np.isfinite(amps).any() and known_median(amps) < -_DRAWS_A:
         odd = f"the current reads {known_median(amps):.1f} A"

@@ -152,8 +152,10 @@ def _of_voltage(flight: Flight, held: Sequence[_Held], why: str) -> list[_Held]:
     battery = next((one for one in flight.batteries if one.number == number), None)
     cell = 0.0 if battery is None or battery.rest_v is None else battery.rest_v / battery.cells
     off = [one for one in held if one.is_off]
-    if cell < _NONE_AT:
-        return [one for one in off if _SENSING.search(one.name)]
+    if cell < _NONE_AT:  # a monitor that is switched off as shipped is no better for being so again
+        return [
+            one for one in off if _SENSING.search(one.name) and not (one.name.endswith("_MONITOR") and not one.default)
+        ]
     return [one for one in off if _LEVEL.search(one.name)] if cell >= _FULL_AT else []
 
 

@@ -49,6 +49,7 @@ _ACTED = LIMITS.add(
 _CELL_LOW_V = 3.5
 LOW_VOLT = ("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT")
 """What the voltage of the low level was called."""
+DRIVES_V = LIMITS.add("voltage that drives a vehicle", 4.0, "V", "one full cell")
 _USUAL = {"low": 3.5, "critical": 3.3}
 _SAID_WITHIN_S = 1.0
 _BY_VOLTAGE, _BY_CHARGE = ("BATT_LOW_VOLT", "BATT_CRT_VOLT"), ("BATT_LOW_MAH", "BATT_CRT_MAH")
@@ -211,6 +212,8 @@ def early_failsafe(flight: Flight) -> Acted | None:
     said = next((match for match in texts if match), None)
     level = "low" if said is None else said[1].casefold()
     volts = float(np.interp(failsafe, battery.table.t, battery.table["Volt"])) if said is None else float(said[2])
+    if volts < DRIVES_V:
+        return None
     by_charge = None if said is None else _by_charge(flight, level, volts, float(said[3]), battery)
     acted = by_charge or _by_voltage(flight, level, volts, battery)
     return None if acted is None else Acted(failsafe, *acted)
