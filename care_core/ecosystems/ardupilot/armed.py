@@ -31,6 +31,8 @@ _OPENED_S, _CLOSED_S = 0.5, 2.0
 """A logger writes so shortly before the record of the arming that opened it, and was silent for longer than so."""
 _FEWEST, _TIMES = 10, 10.0
 """A pause is a closed logger where it is so many times what usually lies between two records."""
+_SPOOLS_S, _NO_CLIMB_M = 1.5, 1.0
+"""No copter climbs so far so shortly after it was armed: its motors still spool up."""
 _NEAR_HOME_M = 50.0
 _ALIVE_M, _ON_GROUND_M, _APART_M = 0.05, 1.2, 3.0
 """A barometer that moves by more lives, and by less than the second on the ground, propellers and all."""
@@ -219,6 +221,9 @@ class Armed(Recorded):
         start = self.armed[0][0] if self.armed else 0.0
         before = table[column][table.t <= start + 1.0]
         zero = float(median(before[-20:])) if len(before) else float(table[column][0])
+        after = table[column][(table.t > start) & (table.t <= start + _SPOOLS_S)]
+        if column == "RelHomeAlt" and len(after) and abs(float(after[-1]) - zero) > _NO_CLIMB_M:
+            zero = float(after[-1])  # home was set to where it is as it was armed
         return table.t, table[column] - (zero if abs(zero) < _NEAR_HOME_M or column != "RelHomeAlt" else 0.0)
 
     @cached_property

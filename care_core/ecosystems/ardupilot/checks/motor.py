@@ -42,6 +42,13 @@ _IN_PAIRS = LIMITS.add(
     "motors from which loads show in pairs", 4, "", "geometry: of three, one alone holds up the end that a load lies at"
 )
 _NEXT = LIMITS.add("share of that which the next motor may have", 0.6, "", "a choice: one motor, not a pair")
+_PAIR = LIMITS.add(
+    "share of that which the motor across may have",
+    0.4,
+    "",
+    "geometry: for a weak motor the one across is asked for less",
+)
+_ACROSS_DEG = LIMITS.add("angle off the arm across", 20.0, "deg", "a choice: frames are not all square")
 _ROOM = LIMITS.add(
     "output of the peers on the ground", 0.7, "of the range", "a choice: above it all are at their limit"
 )
@@ -242,6 +249,9 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         share = outputs.share(since)
         asked = _of_one(_excess(outputs, since), n)
         size = float(median(asked))
+        across = _across(outputs.motors, n)
+        if across is not None and float(median(_of_one(_excess(outputs, since), across))) > _PAIR * size:
+            continue  # both that turn one way: what turns against its will, not one that is weak
         stays = float(above[t >= spans[0][0]].mean()) > _STAYS
         swings = float(np.std(asked - _of_one(_smooth_excess(outputs, since, window), n)))  # not what grows
         steady = size > max(0.7 * ALONE, _STEADY * swings)
@@ -267,6 +277,14 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         + (f"; at its limit {100 * limit:.0f} % of the time" if limit > 0.05 else ""),
         _SOURCE, calibrated_probability(over, _CALIBRATION if changed or over > 2 else _ALWAYS),
     )  # fmt: skip
+
+
+def _across(motors: tuple[Motor, ...], n: int) -> int | None:
+    """The motor of a quadcopter that sits across from one and turns as it does; None of any other frame."""
+    if len(motors) != _IN_PAIRS or not all(motor.place for motor in motors):
+        return None
+    off = [abs((motor.angle_deg - motors[n].angle_deg) % 360 - 180) for motor in motors]
+    return int(np.argmin(off)) if min(off) < _ACROSS_DEG else None
 
 
 def _severity(flight: Flight, limit: float, size: float) -> Severity:
