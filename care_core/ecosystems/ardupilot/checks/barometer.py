@@ -8,6 +8,7 @@ metres in minutes, 10 m is far. On the training table healthy barometers differ 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,9 @@ READS: Wanted = {
 LIMITS = Limits()
 APART_M = LIMITS.add("two barometers apart", 3.0, "m", "three times what arming allows between barometer and estimator")
 DRIFT_M = LIMITS.add("drift from the GPS height", 10.0, "m", "a choice: GPS heights wander by some metres in minutes")
+_OF_HEIGHT = LIMITS.add(
+    "share of a height that it may be off", 0.08, "", "air that is 20 K off the standard atmosphere"
+)
 NOISE_M = LIMITS.add("noise from record to record", 0.5, "m", "three times what a good barometer resolves")
 _APART_S = LIMITS.add("time between records, of a plane", 0.15, "s", "a choice: half of what thinned logs hold")
 _LASTS_S = LIMITS.add("shortest time over a limit", 5.0, "s", "a choice: landing gusts press on it for a second")
@@ -67,6 +71,15 @@ _FIX = 3
 _METRES_PER_DEGREE = 111_319.5
 
 
+class _Test(NamedTuple):
+    """How far off it is, how far it may be, both in m and of shape (n,), and how that is told."""
+
+    size: Floats
+    allowed: Floats
+    limit: float
+    words: str
+
+
 def find(flight: Flight) -> Iterator[Finding]:
     """A barometer that is not to be believed, and one that a range finder contradicts near the ground."""
     yield from _contradicted(flight)
@@ -76,30 +89,26 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     first = baros[0]
     t, height = first.t, first["Alt"]
-    tests: list[tuple[Floats, str]] = [
-        (_noise(flight, t, height) / (NOISE_M + _moved_between(flight, t)), "jumps by {:.1f} m from record to record")
-    ]
+    noise = _noise(flight, t, height)
+    tests = [_Test(noise, NOISE_M + _moved_between(flight, t), NOISE_M, "jumps by {:.1f} m from record to record")]
     for other in baros[1:]:
         apart = height - aligned(t, other.t, other["Alt"])
         apart -= median(apart[: max(len(t) // 20, 3)])
-        tests.append((np.abs(smooth(t, apart, 3.0)) / APART_M, "is {:.1f} m off the second barometer"))
+        off = np.abs(smooth(t, apart, 3.0))
+        tests.append(_Test(off, np.full(len(t), APART_M), APART_M, "is {:.1f} m off the second barometer"))
     drift = _drift(flight, first)
     if drift is not None:
-        tests.append((np.abs(drift) / DRIFT_M, "drifts {:.0f} m from the GPS height"))
-    limits = [NOISE_M, *[APART_M] * (len(baros) - 1), DRIFT_M]
-    broken = [
-        (spans, over, words, limit)
-        for (over, words), limit in zip(tests, limits, strict=False)
-        if (spans := lasting(t, over > 1.0, _LASTS_S, gap_s=5.0))
-    ]
+        allowed = DRIFT_M + _OF_HEIGHT * np.abs(height - height[0])
+        tests.append(_Test(np.abs(drift), allowed, DRIFT_M, "drifts {:.0f} m from the GPS height"))
+    broken = [(spans, one) for one in tests if (spans := lasting(t, one.size > one.allowed, _LASTS_S, gap_s=5.0))]
     if not broken:
         return
-    start = min(spans[0][0] for spans, *_ in broken)
-    end = max(spans[-1][1] for spans, *_ in broken)
-    peaks = [quantile(over[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9) for spans, over, *_ in broken]
+    start = min(spans[0][0] for spans, _ in broken)
+    end = max(spans[-1][1] for spans, _ in broken)
+    during_it = [((t >= spans[0][0]) & (t <= spans[-1][1]), one) for spans, one in broken]
+    peaks = [quantile((one.size / one.allowed)[rows], 0.9) for rows, one in during_it]
     said = "; ".join(
-        f"{words.format(peak * limit)} (limit {limit:g} m)"
-        for peak, (_, _, words, limit) in zip(peaks, broken, strict=True)
+        f"{one.words.format(quantile(one.size[rows], 0.9))} (limit {one.limit:g} m)" for rows, one in during_it
     )
     yield Finding(
         kind="barometer",

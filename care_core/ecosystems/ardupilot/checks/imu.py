@@ -50,6 +50,10 @@ _DPS_PER_VIBE = LIMITS.add(
 _ACC_PER_VIBE = LIMITS.add("difference that vibration adds, for each m/s^2", 0.3, "m/s^2", "a choice")
 _OF_RATE = LIMITS.add("share of a rate that two gyros differ by", 0.06, "", "MPU-6000: sensitivity +-3 % each")
 _FAST_DPS = LIMITS.add("rate below which that is nothing", 30.0, "deg/s", "a choice: noise is more")
+_CALM_S = LIMITS.add("time in which it hardly turns that tells of noise", 1.0, "s", "a choice")
+_AT_REST = LIMITS.add(
+    "share of a noise that is there where it hardly turns, too", 0.5, "", "a choice: the middle is less"
+)
 _TURNS_OVER_S = LIMITS.add("left out before control was lost", 3.0, "s", "a choice: it turns too fast to compare")
 _USUAL_VIBE = LIMITS.add("vibration where none is recorded", 15.0, "m/s^2", "a choice: half of what is acceptable")
 _SHAKEN_DPS = LIMITS.add("shaking that hides an offset", 20.0, "deg/s", "a choice: gyros are not sampled at once")
@@ -127,6 +131,8 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     inside = (t >= spans[0][0]) & (t <= end)
     ratio = quantile(over[inside], 0.9)
     is_noise = float(np.max((noise / limit)[inside])) > 1.0
+    if is_noise and not _is_noisy_at_rest(sensors[0], apart, start):
+        return
     size = quantile((noise if is_noise else offset)[inside], 0.9)
     allowed = float(median(limit[inside])) if is_noise else OFFSET_DPS
     severity = _severity(flight, ratio, start)
@@ -146,6 +152,16 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
         probability=calibrated_probability(ratio, _CALIBRATION),
         mission_lost=_LOST if is_noise and severity == "warning" else None,
     )
+
+
+def _is_noisy_at_rest(table: Table, apart: Floats, since_s: float) -> bool:
+    """Whether the two differ, shape (3, n), where it hardly turns as well: what does so only as it turns are samples of
+    different moments."""
+    rate = smooth(table.t, np.degrees(length(table[axis] for axis in GYROS)), 1.0)
+    calm = (rate < _FAST_DPS / 2) & (table.t >= since_s)
+    if calm.sum() < records(table.t, _CALM_S):
+        return not (rate[table.t >= since_s] > _FAST_DPS).all()
+    return min(float(median(np.abs(axis - smooth(table.t, axis, 5.0))[calm])) for axis in apart) > _AT_REST * NOISE_DPS
 
 
 def _at_another_moment(flight: Flight, table: Table) -> Floats:
