@@ -28,7 +28,7 @@ def _marks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         for name, what in (("marking", "puts obstacles into it"), ("clearing", "takes obstacles out of it")):
             switches = [entry for layer in marking for entry in layer.own(name)]
             if switches and all(entry.value == "false" for entry in switches):
-                text = f"No source of {costmap.scope[-1] if costmap.scope else 'the costmap'} {what}."
+                text = f"No source of {costmap.name() or 'the costmap'} {what}."
                 hint = f"Switch {name} on for one."
                 yield warning("hinders", file, switches[0], text, hint, "obstacle_layer.cpp", switches[1:])
     for reader in held.of(*OBSTACLES, COSTMAP):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable, Sequence
 
+from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.scopes import Keys, Scoped
@@ -33,6 +34,10 @@ class Reader(Struct, eq=False):
     owners: tuple[str, ...]
     scope: Keys
     values: dict[str, Entry] = field(default_factory=dict)
+
+    def name(self) -> str:
+        """What its namespace or node is called, empty where the file gives it no name."""
+        return next((key for key in reversed(self.scope) if key != PARAMETERS), "")
 
     def number(self, name: str) -> float | None:
         entry = self.values.get(name)

@@ -355,3 +355,12 @@ LAYERED = """local_costmap:
 def test_costmaps_that_see_nothing_or_forget_nothing_are_found(tmp_path: Path, old: str, new: str, rule: str) -> None:
     text = LAYERED.replace(old, new)
     assert [one.rule for one in findings(tmp_path, "a.yaml", text)] == ([rule] if rule else [])
+
+
+@pytest.mark.parametrize("above", ["", "robot1", "<robot_namespace>"])
+def test_a_costmap_is_called_by_its_own_name_whatever_it_stands_below(tmp_path: Path, above: str) -> None:
+    text = LAYERED.replace("clearing: true", "clearing: false")
+    if above:
+        text = "\n".join([f'"{above}":', *(f"  {line}" for line in text.splitlines()), ""])
+    (found,) = findings(tmp_path, "a.yaml", text)
+    assert found.text == "No source of local_costmap takes obstacles out of it."
