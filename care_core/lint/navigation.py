@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import UsageError, nearest
 from care_core.lint import contradictions, plugins, workable
 from care_core.lint.generic import problem_at
@@ -29,6 +30,7 @@ _COPIED = {
 }
 """What a costmap hands on to a layer of that class from its own namespace (copyParentParameters)."""
 _SHAPE = "costmap_2d_ros.cpp of Nav2, getParameters, and makeFootprintFromParams of ROS 1 ask for a footprint first"
+_NAMESPACE = "costmap_2d_ros.cpp of Nav2 gives the node a namespace of its own name"
 _LOCAL = "local_costmap"
 _COSTMAP_SOURCE = "costmap_2d_ros.cpp of ros-planning/navigation (noetic)"
 
@@ -60,6 +62,7 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         text = f"Nothing loads {name}: no list of {key} names it."
         yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
     if result.ros == "ros2":
+        yield from _misnested(file, result)
         yield from _nodes(file, distribution)
         yield from plugins.check(file, distribution)
     yield from _unused(file, result)
@@ -254,6 +257,15 @@ def _rescaled(fact: Fact, entry: Entry, types: set[str]) -> str:
     if types == {"int"} and number < one.between:
         return f"It is in {one.old} before {one.since}, in {one.new} since: write {number * one.ratio:.0f}."
     return ""
+
+
+def _misnested(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+    """Costmaps by the name of a node that there is not. What stands there is judged once it is read."""
+    for keys, entry in result.misnested.items():
+        node = (*keys, keys[-1])
+        text = f"Nothing reads this part: the costmap is the node /{'/'.join(node)}, not /{'/'.join(keys)}."
+        hint = f"Write {': '.join((*node, PARAMETERS))}:, each below the other. What nobody reads is not judged here."
+        yield problem_at("misplaced-key", Severity.WARNING, file, entry, text, hint, _NAMESPACE)
 
 
 def _nodes(file: ConfigFile, distribution: str) -> Iterator[Problem]:

@@ -61,6 +61,8 @@ class Scoped(Struct, eq=False):
     """The first value of a part, and the list that would have to name it."""
     plugins: dict[Keys, dict[str, str]] = field(default_factory=dict)
     """By the keys of a costmap (ROS 1): its layers by name, with their class."""
+    misnested: dict[Keys, Entry] = field(default_factory=dict)
+    """By the keys of a costmap's node (ROS 2) that stands elsewhere than the costmap does: the first of its values."""
 
     def scopes(self) -> Mapping[Keys, dict[str, Entry]]:
         """The values of each part by their last key."""
@@ -126,6 +128,9 @@ def _ros2(file: ConfigFile) -> Scoped:
         at = keys.index(PARAMETERS)
         node = keys[at - 1]
         owner = COSTMAP if node in _COSTMAPS else node if node in navigation.owners("ros2") else ""
+        if owner == COSTMAP and not _is_costmap(file, keys[:at]):
+            result.misnested.setdefault(keys[:at], entry)
+            owner = ""
         owners = () if not owner or "*" in node else (owner,)
         place = _descend(entry, keys, at + 1, owners, values)
         result.places.append(place)
@@ -134,6 +139,12 @@ def _ros2(file: ConfigFile) -> Scoped:
             unloaded.add(part)
             result.not_loaded.append((entry, "plugins"))
     return result
+
+
+def _is_costmap(file: ConfigFile, node: Keys) -> bool:
+    """Whether a costmap has that name: it stands in a namespace of its own name. A pattern may mean any."""
+    name = (*(part for part in file.namespace.split("/") if part), *node)
+    return any("*" in part for part in name) or name[-2:-1] == name[-1:]
 
 
 def _descend(entry: Entry, keys: Keys, at: int, owners: Keys, values: Mapping[Keys, Entry]) -> Place:

@@ -142,7 +142,7 @@ def test_lists_of_the_velocity_smoother_that_it_refuses(
 
 
 def costmap(*lines: str, name: str = "global_costmap") -> str:
-    return f"{name}:\n  {node(name, *lines)}".replace("\n", "\n  ")
+    return "\n".join([f"{name}:", *(f"  {line}" for line in node(name, *lines).splitlines()), ""])
 
 
 FOOTPRINT = 'footprint: "[[0.3, 0.2], [0.3, -0.2], [-0.3, -0.2], [-0.3, 0.2]]"'
@@ -179,6 +179,35 @@ def test_what_is_marked_farther_than_it_is_cleared(tmp_path: Path, source: str, 
              "  observation_sources: scan", f"  scan: {{topic: /scan, {source}}}")  # fmt: skip
     found = [one for one in told(tmp_path, costmap(*layer)) if one[0] == "contradiction"]
     assert found == ([("contradiction", "warning", key)] if key else [])
+
+
+@pytest.mark.parametrize(
+    ("above", "is_read"),
+    [
+        ("local_costmap:", False),
+        ("/local_costmap:", False),
+        ("robot1/local_costmap:", False),
+        ("local_costmap/local_costmap:", True),
+        ("/robot1/local_costmap/local_costmap:", True),
+        ("/**/local_costmap:", True),
+        ("/*/local_costmap:", True),
+    ],
+)
+def test_a_costmap_stands_in_a_namespace_of_its_own_name(tmp_path: Path, above: str, is_read: bool) -> None:
+    found = findings(tmp_path, f"{above}\n  ros__parameters:\n    width: 3.0\n    plugins: [static_layer]\n")
+    assert [one.rule for one in found] == (["wrong-type"] if is_read else ["misplaced-key"])
+    name = above.strip("/:")
+    assert (
+        is_read
+        or found[0].text == f"Nothing reads this part: the costmap is the node /{name}/local_costmap, not /{name}."
+    )
+
+
+def test_a_namespace_that_a_file_is_loaded_into_counts(tmp_path: Path) -> None:
+    path = tmp_path / "nav2.yaml"
+    path.write_text("local_costmap:\n  ros__parameters:\n    width: 3.0\n")
+    (linted,) = lint([f"/robot1/local_costmap={path}"])
+    assert [one.rule for one in linted.problems] == ["wrong-type"]
 
 
 def planner(plugin: str) -> str:
