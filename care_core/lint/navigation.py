@@ -12,7 +12,7 @@ from care_core.errors import UsageError, nearest
 from care_core.lint import contradictions, plugins, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED
+from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED
 from care_core.lint.scopes import COSTMAP, Place, Scoped, class_of, costmaps, scoped, split
 from care_core.lint.unread import unread
 from care_core.metadata import navigation
@@ -50,6 +50,9 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of ROS parameters."""
     result = scoped(file)
     distribution = distribution_of(target, result.ros)
+    if result.ros == "ros1" and (foreign := [one for one in file.entries if ROS2_ALONE.intersection(one.keys[:-1])]):
+        yield _no_parameters(file, foreign)
+        return
     told = frozenset({distribution} if distribution else ())
     shown = told or (plugins.shown(file) if result.ros == "ros2" else told)
     likely = told or _likely(result, shown)
@@ -67,6 +70,19 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         yield from plugins.check(file, distribution)
     yield from _unused(file, result)
     yield from values(file, result)
+
+
+def _no_parameters(file: ConfigFile, entries: Sequence[Entry]) -> Problem:
+    """Nodes of Nav2 in a file without the key that their parameters stand below: the file of something else, such as a
+    launch, or one whose values they would read, had they the key."""
+    node = next(key for key in entries[0].keys if key in ROS2_ALONE)
+    is_meant = any(
+        navigation.known("ros2", key, one.keys[-1]) for one in entries for key in one.keys if key in ROS2_ALONE
+    )
+    text = f"This is no parameter file of ROS 2: it names {node}, and nothing in it stands below {PARAMETERS}."
+    hint = f"A parameter file has NODE: {PARAMETERS}: NAME: VALUE."
+    severity = Severity.WARNING if is_meant else Severity.NOTE
+    return problem_at("no-parameters", severity, file, entries[0], text, hint)
 
 
 def values(file: ConfigFile, result: Scoped) -> Iterator[Problem]:

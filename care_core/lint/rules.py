@@ -16,6 +16,7 @@ class Rule(NamedTuple):
 _TABLES = "the sources of each release, as tables"
 RULES: tuple[Rule, ...] = (
     Rule("syntax", "A line that the reader of the format refuses.", "the format: YAML, NAME VALUE, or five columns"),
+    Rule("no-parameters", "Nodes of Nav2 in a file without ros__parameters.", "ROS 2, parse.c: no value before it"),
     Rule("duplicate", "The same parameter twice in one file.", "how the readers of the format work"),
     Rule("unknown-key", "A name that nothing reads in any release.", _TABLES),
     Rule("misplaced-key", "A name that is read elsewhere, but not at that place.", _TABLES),
@@ -77,6 +78,12 @@ ROS2_RENAMED: tuple[Renamed, ...] = (
 
 ROS2_NODES_RENAMED: tuple[tuple[str, str, str], ...] = (("recoveries_server", "behavior_server", "humble"),)
 """Nodes: the old name, the new one, and the distribution that has it."""
+
+
+ROS2_ALONE = frozenset({
+    "bt_navigator", "controller_server", "planner_server", "smoother_server", "behavior_server", "recoveries_server",
+})  # fmt: skip
+"""Nodes of Nav2 by names that no node of ROS 1 has."""
 
 
 class Rescaled(NamedTuple):

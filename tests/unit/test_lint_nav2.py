@@ -181,6 +181,30 @@ def test_what_is_marked_farther_than_it_is_cleared(tmp_path: Path, source: str, 
     assert found == ([("contradiction", "warning", key)] if key else [])
 
 
+LAUNCH = """{}
+  bt_navigator:
+    app: bt_navigator
+    params: [replanning]
+  amcl:
+    app: amcl
+    params: [amcl_diff]
+  map_server: {{app: map_server, params: [map_server], dead: 1}}
+"""
+
+
+@pytest.mark.parametrize("above", ["nodes:", "containers:\n one:", "robot1:"])
+def test_a_file_that_launches_nodes_is_no_parameter_file_and_nothing_else(tmp_path: Path, above: str) -> None:
+    (found,) = findings(tmp_path, LAUNCH.format(above))
+    assert (found.rule, found.severity) == ("no-parameters", Severity.NOTE)
+    assert found.text.startswith("This is no parameter file of ROS 2: it names bt_navigator")
+
+
+def test_values_of_a_node_without_the_key_that_ros_2_asks_for(tmp_path: Path) -> None:
+    text = "controller_server:\n  controller_frequency: 20.0\namcl:\n  alfa1: 0.2\n"
+    assert told(tmp_path, text) == [("no-parameters", "warning", "controller_frequency")]
+    assert told(tmp_path, "amcl:\n  odom_alpha1: 0.2\n  bt_navigator: 1\n")[0][0] == "unknown-key"
+
+
 @pytest.mark.parametrize(
     ("above", "is_read"),
     [
