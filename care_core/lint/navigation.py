@@ -66,7 +66,7 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
     if result.ros == "ros2":
         yield from _misnested(file, result)
-        yield from _nodes(file, distribution)
+        yield from _nodes(file, shown, is_told=bool(told))
         yield from plugins.check(file, distribution)
     yield from _unused(file, result)
     yield from values(file, result)
@@ -284,20 +284,26 @@ def _misnested(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
         yield problem_at("misplaced-key", Severity.WARNING, file, entry, text, hint, _NAMESPACE)
 
 
-def _nodes(file: ConfigFile, distribution: str) -> Iterator[Problem]:
-    """Nodes by a name that the file's release does not have any more; where nobody says which that is, a note."""
+def _nodes(file: ConfigFile, releases: frozenset[str], *, is_told: bool) -> Iterator[Problem]:
+    """Nodes by a name that the file's releases do not have any more, where it has nothing by the new one; where nothing
+    says which releases those are, a note.
+
+    Args:
+        releases: what somebody, or its plugins, say that the file is for.
+        is_told: whether somebody says so.
+    """
     order = DISTRIBUTIONS["ros2"]
-    seen: set[str] = set()
+    nodes: dict[str, Entry] = {}
     for entry in file.entries:
-        for old, new, since in ROS2_NODES_RENAMED:
-            if entry.keys[0] == old and old not in seen:
-                seen.add(old)
-                is_told = distribution in order and order.index(distribution) >= order.index(since)
-                if distribution and not is_told:
-                    continue
-                text = f"The node {old} is {new} since {since}: later distributions do not read this part."
-                severity = Severity.WARNING if is_told else Severity.NOTE
-                yield problem_at("renamed", severity, file, entry, text, f"Name it {new}.", STACKS["ros2"])
+        for key in entry.keys[:-1]:
+            nodes.setdefault(key, entry)
+    for old, new, since, also in ROS2_NODES_RENAMED:
+        newer = [order.index(one) >= order.index(since) for one in releases]
+        if old not in nodes or (is_told and not all(newer)):
+            continue
+        text = f"The node {old} is {new} since {since}: later distributions do not read this part."
+        severity = Severity.WARNING if newer and all(newer) and new not in nodes else Severity.NOTE
+        yield problem_at("renamed", severity, file, nodes[old], text, f"Name it {new}, {also}.", STACKS["ros2"])
 
 
 def _unused(file: ConfigFile, result: Scoped) -> Iterator[Problem]:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.readers import COLLISIONS
+from care_core.lint.rules import ROS2_NODES_RENAMED
 from care_core.lint.scopes import Keys, class_of, split, words_of
 from care_core.metadata import plugins
-from care_core.metadata.navigation import spans
+from care_core.metadata.navigation import DISTRIBUTIONS, spans
 
 _NAMING = ("plugin", "primary_controller")
 """Keys whose value is the name of a plugin."""
@@ -40,20 +41,48 @@ def check(file: ConfigFile, distribution: str) -> Iterator[Problem]:
         distribution: what the file is for; empty where nobody says so.
     """
     values = {split(entry): entry for entry in file.entries}
-    yield from _names(file, _named(values), distribution)
+    yield from _names(file, _named(values, distribution), distribution)
     yield from _critics(file, values)
 
 
 def shown(file: ConfigFile) -> frozenset[str]:
     """The releases that load every plugin of a file that any release loads; empty where the file names none, or none
     loads all of them."""
-    releases = [plugins.releases_of(str(one.value)) for one in _named({split(one): one for one in file.entries})]
-    known = [one for one in releases if one]
+    known = _known(_named({split(one): one for one in file.entries}))
     return frozenset.intersection(*known) if known else frozenset()
 
 
-def _named(values: Mapping[Keys, Entry]) -> list[Entry]:
-    return [entry for keys, entry in values.items() if PARAMETERS in keys and keys[-1] in _NAMING]
+def _known(named: Iterable[Entry]) -> list[frozenset[str]]:
+    """The releases of each plugin that any release loads."""
+    return [releases for one in named if (releases := plugins.releases_of(str(one.value)))]
+
+
+def _usual(known: Iterable[frozenset[str]]) -> frozenset[str]:
+    """The releases that load most of these plugins."""
+    counts = Counter(release for releases in known for release in releases)
+    most = max(counts.values(), default=0)
+    return frozenset(release for release, count in counts.items() if count == most)
+
+
+def _named(values: Mapping[Keys, Entry], distribution: str = "") -> list[Entry]:
+    """What names a plugin, without the nodes that the file's release has by another name: it loads nothing of theirs.
+
+    That release is told, or the plugins of the other nodes show it.
+    """
+    named = {keys: entry for keys, entry in values.items() if PARAMETERS in keys and keys[-1] in _NAMING}
+    others = [entry for keys, entry in named.items() if not _since_when_renamed(keys)]
+    releases = {distribution} if distribution else _usual(_known(others))
+    order = DISTRIBUTIONS["ros2"]
+    first = min((order.index(one) for one in releases), default=-1)
+    return [
+        entry for keys, entry in named.items() if not (since := _since_when_renamed(keys)) or first < order.index(since)
+    ]
+
+
+def _since_when_renamed(keys: Keys) -> str:
+    """The release since which the node of a value has another name, empty where it has none."""
+    node = keys[keys.index(PARAMETERS) - 1]
+    return next((since for old, _, since, _ in ROS2_NODES_RENAMED if old == node), "")
 
 
 def _names(file: ConfigFile, named: list[Entry], distribution: str) -> Iterator[Problem]:
@@ -97,11 +126,7 @@ def _elsewhere(file: ConfigFile, entry: Entry, name: str, releases: frozenset[st
 
 def _beside(file: ConfigFile, known: list[tuple[Entry, frozenset[str]]]) -> Iterator[Problem]:
     """Names that no one release loads together: those off the releases that load most of them."""
-    counts = Counter(release for _, releases in known for release in releases)
-    most = max(counts.values(), default=0)
-    if most == len(known):
-        return
-    usual = frozenset(release for release, count in counts.items() if count == most)
+    usual = _usual(releases for _, releases in known)
     for entry, releases in known:
         if releases & usual:
             continue

@@ -76,9 +76,11 @@ ROS2_RENAMED: tuple[Renamed, ...] = (
 )  # fmt: skip
 """Old and new name in the sources of neighbouring distributions."""
 
-ROS2_NODES_RENAMED: tuple[tuple[str, str, str], ...] = (("recoveries_server", "behavior_server", "humble"),)
-"""Nodes: the old name, the new one, and the distribution that has it."""
-
+ROS2_NODES_RENAMED: tuple[tuple[str, str, str, str], ...] = (
+    ("recoveries_server", "behavior_server", "humble",
+     "recovery_plugins behavior_plugins, and the package of its plugins nav2_behaviors"),
+)  # fmt: skip
+"""Nodes: the old name, the new one, the distribution that has it, and what else has another name since then."""
 
 ROS2_ALONE = frozenset({
     "bt_navigator", "controller_server", "planner_server", "smoother_server", "behavior_server", "recoveries_server",

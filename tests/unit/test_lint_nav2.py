@@ -291,6 +291,45 @@ def test_plugins_of_two_releases_in_one_file(tmp_path: Path) -> None:
     assert findings(tmp_path, planner("nav2_navfn_planner::NavfnPlanner") + behaviors) == ()
 
 
+RECOVERIES = node("recoveries_server", "recovery_plugins: [spin, wait]", "spin:", "  plugin: nav2_recoveries/Spin",
+                  "wait:", "  plugin: nav2_recoveries/Wait")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("plugin", "target", "rules"),
+    [
+        ("nav2_navfn_planner/NavfnPlanner", "", [("renamed", "note")]),
+        ("nav2_navfn_planner/NavfnPlanner", "galactic", []),
+        ("nav2_navfn_planner/NavfnPlanner", "humble", [("renamed", "warning")]),
+        ("nav2_smac_planner/SmacPlannerLattice", "", [("renamed", "warning")]),
+        ("nav2_navfn_planner::NavfnPlanner", "", [("renamed", "warning")]),
+        ("nav2_smac_planner/SmacPlannerLattice", "galactic", [("plugin-name", "error")]),
+    ],
+)
+def test_plugins_of_a_node_that_the_release_does_not_have_show_nothing(
+    tmp_path: Path, plugin: str, target: str, rules: list[tuple[str, str]]
+) -> None:
+    found = findings(tmp_path, planner(plugin) + RECOVERIES, target)
+    assert [(one.rule, one.severity.value) for one in found] == rules
+    assert all("nav2_behaviors" in one.hint for one in found if one.rule == "renamed")
+
+
+def test_a_file_with_the_node_by_both_names_is_for_releases_before_and_after(tmp_path: Path) -> None:
+    both = planner("nav2_navfn_planner::NavfnPlanner") + RECOVERIES
+    behaviors = node("behavior_server", "behavior_plugins: [spin]", "spin:", "  plugin: nav2_behaviors::Spin")
+    assert told(tmp_path, both + behaviors) == [("renamed", "note", "recovery_plugins")]
+
+
+def test_of_plugins_that_are_read_the_odd_one_out_is_blamed(tmp_path: Path) -> None:
+    smac = planner("nav2_smac_planner/SmacPlannerHybrid").replace("[GridBased]", "[GridBased, Other, Third]")
+    smac += "    Other: {plugin: nav2_smac_planner/SmacPlannerLattice}\n"
+    smac += "    Third: {plugin: nav2_navfn_planner::NavfnPlanner}\n"
+    (found,) = [one for one in findings(tmp_path, smac + RECOVERIES) if one.rule == "plugin-name"]
+    assert found.text.startswith(
+        "nav2_navfn_planner::NavfnPlanner is loaded in jazzy to rolling, and the other plugins"
+    )
+
+
 @pytest.mark.parametrize(
     ("plugin", "lines", "wanted"),
     [
