@@ -134,6 +134,23 @@ LEFTOVERS: tuple[Leftover, ...] = (
 )  # fmt: skip
 """nav2_params.yaml of foxy to iron holds the first, that of jazzy to rolling the second."""
 
+
+class Paired(NamedTuple):
+    """Two lists of eloquent, of names and of classes side by side, for which releases since foxy have one of names."""
+
+    owner: str
+    names: str
+    classes: str
+    now: str
+
+
+PAIRED: tuple[Paired, ...] = (
+    Paired("costmap", "plugin_names", "plugin_types", "plugins"),
+    Paired("controller_server", "controller_plugin_ids", "controller_plugin_types", "controller_plugins"),
+    Paired("planner_server", "planner_plugin_ids", "planner_plugin_types", "planner_plugins"),
+)
+PAIRED_SOURCE = "costmap_2d_ros.cpp, nav2_controller.cpp and planner_server.cpp of eloquent and foxy"
+
 MEANT: dict[tuple[str, str], str] = {
     ("DWAPlannerROS", "max_vel_rot"): "max_vel_theta",
     ("DWAPlannerROS", "min_vel_rot"): "min_vel_theta",

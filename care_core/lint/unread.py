@@ -10,8 +10,8 @@ from difflib import SequenceMatcher
 
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Problem, Severity
-from care_core.lint.rules import LEFTOVERS, MEANT, Leftover
-from care_core.lint.scopes import Place, Scoped, class_of, split
+from care_core.lint.rules import LEFTOVERS, MEANT, PAIRED, PAIRED_SOURCE, Leftover, Paired
+from care_core.lint.scopes import Keys, Place, Scoped, class_of, split, words_of
 from care_core.metadata import navigation
 from care_core.metadata.navigation import DISTRIBUTIONS, STACKS
 
@@ -38,6 +38,9 @@ def unread(
         shown: those that somebody or its plugins say it is for; empty where nothing says so.
     """
     owner = place.owners[0]
+    paired = next((one for one in PAIRED if one.owner == owner and place.name in (one.names, one.classes)), None)
+    if paired is not None and result.ros == "ros2":
+        return _paired(file, result, place, paired)
     leftover = next((one for one in LEFTOVERS if one.owner in place.owners and one.name == place.name), None)
     if leftover is not None and (leftover.reads or str(place.entry.value) == leftover.default):
         return _leftover(file, place, leftover)
@@ -52,6 +55,31 @@ def unread(
     text = f"{place.name} is not a parameter of {' or '.join(place.owners)} in any release from {first} to {last}."
     hint = f"Did you mean {meant}?" if meant else "Leave it out." if others else "Check its spelling, or leave it out."
     return problem_at("unknown-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
+
+
+def _paired(file: ConfigFile, result: Scoped, place: Place, paired: Paired) -> Problem | None:
+    """The lists by which eloquent loads plugins, once for both."""
+    beside = {one.name: one.entry for one in result.places if one.scope == place.scope}
+    held = [name for name in (paired.names, paired.classes) if name in beside]
+    if place.name != held[0]:
+        return None
+    verb, them = ("are", "them") if held[1:] else ("is", "it")
+    text = f"{' and '.join(held)} {verb} of eloquent: since foxy {paired.owner} reads {paired.now}"
+    if paired.now in beside:
+        text, hint = f"{text} alone.", f"Leave {them} out."
+    else:
+        text += ". That is missing here: the default plugins are loaded."
+        hint = f"Write {paired.now} with the names, and plugin with its class below each name."
+        if _have_classes(file, place.scope, words_of(beside.get(paired.names))):
+            hint = f"Name {paired.names} {paired.now}{f', and leave {paired.classes} out' if held[1:] else ''}."
+    others = tuple(beside[name].name for name in held[1:])
+    return problem_at("renamed", Severity.WARNING, file, place.entry, text, hint, PAIRED_SOURCE, others)
+
+
+def _have_classes(file: ConfigFile, scope: Keys, names: Sequence[str]) -> bool:
+    """Whether each of these parts says which class it is of."""
+    held = {split(entry) for entry in file.entries}
+    return bool(names) and all((*scope, name, "plugin") in held for name in names)
 
 
 # What is meant

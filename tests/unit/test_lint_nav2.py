@@ -478,8 +478,6 @@ def test_what_is_proposed_for_an_unknown_name_is_free_and_means_the_same(
         (controller(DWB, "max_vel_theta: 1.0", "min_vel_theta: -1.0"), "unknown-key",
          "Check its spelling, or leave it out."),
         (controller(DWB, "min_vel_theta: -1.0"), "unknown-key", "Check its spelling, or leave it out."),
-        (node("controller_server", "controller_plugin_types: [a]", "controller_plugins: [b]"), "unknown-key",
-         "Check its spelling, or leave it out."),
         (node("velocity_smoother", "max_vel: [0.5, 0.0, 1.0]"), "unknown-key", "Did you mean max_velocity?"),
         (node("velocity_smoother", "max_vel: [0.5, 0.0, 1.0]", "max_velocity: [0.5, 0.0, 1.0]"), "unknown-key",
          "Leave it out."),
@@ -493,6 +491,34 @@ def test_what_is_proposed_for_an_unknown_name_is_free_and_means_the_same(
 def test_a_name_that_others_have_by_chance_is_not_moved(tmp_path: Path, text: str, rule: str, hint: str) -> None:
     (found,) = findings(tmp_path, text)
     assert (found.rule, found.hint) == (rule, hint)
+
+
+@pytest.mark.parametrize(
+    ("text", "told_of", "hint"),
+    [
+        (costmap("plugin_types: ['nav2_costmap_2d::StaticLayer']", "plugin_names: [static]"),
+         "plugin_names and plugin_types are",
+         "Write plugins with the names, and plugin with its class below each name."),
+        (costmap("plugin_names: [static]", "static: {plugin: 'nav2_costmap_2d::StaticLayer'}"), "plugin_names is",
+         "Name plugin_names plugins."),
+        (costmap("plugin_names: [a]", "plugin_types: [b]", "a: {plugin: 'nav2_costmap_2d::StaticLayer'}"),
+         "plugin_names and plugin_types are", "Name plugin_names plugins, and leave plugin_types out."),
+        (costmap("plugin_names: [static]"), "plugin_names is",
+         "Write plugins with the names, and plugin with its class below each name."),
+        (costmap("plugin_names: [a]", "plugin_types: [b]", "plugins: [static_layer, obstacle_layer, inflation_layer]"),
+         "plugin_names and plugin_types are", "Leave them out."),
+        (node("controller_server", "controller_plugin_types: [a]", "controller_plugins: [b]",
+              "b: {plugin: 'my::Controller'}"), "controller_plugin_types is", "Leave it out."),
+        (node("planner_server", "planner_plugin_types: [a]", "planner_plugin_ids: [b]"),
+         "planner_plugin_ids and planner_plugin_types are",
+         "Write planner_plugins with the names, and plugin with its class below each name."),
+    ],
+)  # fmt: skip
+def test_the_two_lists_of_eloquent_are_one_since_foxy(tmp_path: Path, text: str, told_of: str, hint: str) -> None:
+    (found,) = findings(tmp_path, text)
+    assert (found.rule, found.severity, found.hint) == ("renamed", Severity.WARNING, hint)
+    assert found.text.startswith(f"{told_of} of eloquent: since foxy ")
+    assert ("default plugins" in found.text) is (not hint.startswith("Leave"))
 
 
 @pytest.mark.parametrize(
