@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import UsageError, nearest
-from care_core.lint import contradictions, plugins, workable
+from care_core.lint import contradictions, lists, plugins, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED
@@ -68,6 +68,7 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         yield from _misnested(file, result)
         yield from _nodes(file, shown, is_told=bool(told))
         yield from plugins.check(file, distribution)
+        yield from lists.classless(file, result, shown)
     yield from _unused(file, result)
     yield from values(file, result)
 

@@ -218,7 +218,7 @@ def test_values_of_a_node_without_the_key_that_ros_2_asks_for(tmp_path: Path) ->
     ],
 )
 def test_a_costmap_stands_in_a_namespace_of_its_own_name(tmp_path: Path, above: str, is_read: bool) -> None:
-    found = findings(tmp_path, f"{above}\n  ros__parameters:\n    width: 3.0\n    plugins: [static_layer]\n")
+    found = findings(tmp_path, f"{above}\n  ros__parameters:\n    width: 3.0\n")
     assert [one.rule for one in found] == (["wrong-type"] if is_read else ["misplaced-key"])
     name = above.strip("/:")
     assert (
@@ -265,6 +265,37 @@ def test_a_plugin_of_a_kind_that_the_release_does_not_load_stops_no_node(tmp_pat
     assert told(tmp_path, text, "iron") == []
     assert ("plugin-name", "warning", "plugin") in told(tmp_path, text, "humble")
     assert ("plugin-name", "error", "plugin") in told(tmp_path, text, "jazzy")
+
+
+@pytest.mark.parametrize(
+    ("text", "lacking"),
+    [
+        (costmap("plugins: [voxel_layer, inflation_layer]", "voxel_layer: {enabled: true}",
+                 "inflation_layer.plugin: 'nav2_costmap_2d::InflationLayer'"), "voxel_layer"),
+        (costmap("plugins: [voxel_layer, inflation_layer]"), "voxel_layer, inflation_layer"),
+        (costmap("plugins: [static_layer, obstacle_layer, inflation_layer]"), ""),
+        (costmap("plugins: [static_layer, inflation_layer]"), "static_layer, inflation_layer"),
+        (costmap("plugins: []", "filters: [keepout]"), "keepout"),
+        (costmap("plugins: $(var layers)"), ""),
+        (costmap("plugins: [voxel]") + node("/**", "voxel: {plugin: 'nav2_costmap_2d::VoxelLayer'}"), ""),
+        (node("controller_server", "controller_plugins: [FollowPath]"), ""),
+        (node("controller_server", "controller_plugins: [FollowPath, Other]", "FollowPath.plugin: my::Own"), "Other"),
+        (node("controller_server", "goal_checker_plugins: [general_goal_checker]"), "general_goal_checker"),
+        (node("behavior_server", "behavior_plugins: [spin, backup, drive_on_heading, wait]"), ""),
+        (node("behavior_server", "behavior_plugins: [spin]", "spin: {plugin: 'nav2_behaviors::Spin'}"), ""),
+        (node("my_server", "controller_plugins: [Other]"), ""),
+    ],
+)  # fmt: skip
+def test_a_plugin_of_which_nothing_says_the_class_is_refused(tmp_path: Path, text: str, lacking: str) -> None:
+    found = findings(tmp_path, text)
+    assert [one.rule for one in found] == (["cannot-work"] if lacking else [])
+    assert all(f" names {lacking}, and nothing here says " in one.text for one in found)
+
+
+def test_a_list_that_the_release_does_not_read_refuses_nothing(tmp_path: Path) -> None:
+    text = node("controller_server", "progress_checker_plugins: [stuck]")
+    assert told(tmp_path, text, "jazzy") == [("cannot-work", "warning", "progress_checker_plugins")]
+    assert ("cannot-work", "warning", "progress_checker_plugins") not in told(tmp_path, text, "humble")
 
 
 @pytest.mark.parametrize(
@@ -385,7 +416,8 @@ def test_what_nav2_ships_and_nothing_reads_is_told_once_it_is_changed(tmp_path: 
     assert told(tmp_path, node("docking_server", docking[0], docking[1].format("0.1"))) == []
     (found,) = findings(tmp_path, node("docking_server", docking[0], docking[1].format("0.05")))
     assert (found.rule, found.hint) == ("unknown-key", "Did you mean simulation_time_step?")
-    spare = ("plugins: [inflation_layer]", "static_layer:", "  plugin: nav2_costmap_2d::StaticLayer")
+    spare = ("plugins: [inflation]", "inflation: {plugin: 'nav2_costmap_2d::InflationLayer'}", "static_layer:",
+             "  plugin: nav2_costmap_2d::StaticLayer")  # fmt: skip
     assert told(tmp_path, costmap(*spare, name="local_costmap")) == []
     assert told(tmp_path, costmap(*spare)) == [("not-loaded", "note", "plugin")]
 
