@@ -1,15 +1,17 @@
-"""Lists by which nodes of Nav2 load their plugins: names of which nothing says the class."""
+"""Lists by which nodes of Nav2 load their plugins: names of which nothing says the class, and values of a plugin that
+stand beside the list instead of below the name."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Problem, Severity
-from care_core.lint.scopes import COSTMAP, Keys, Place, Scoped, split, words_of
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.scopes import COSTMAP, Keys, Place, Scoped, of_class, split, words_of
 from care_core.metadata import navigation
+from care_core.metadata.navigation import STACKS, spanned, spans
 
 
 class PluginList(NamedTuple):
@@ -17,22 +19,37 @@ class PluginList(NamedTuple):
 
     owner: str
     key: str
-    defaults: tuple[str, ...] = ()
-    """The names that have a class without being told, as long as the list is this one."""
+    defaults: tuple[tuple[str, str], ...] = ()
+    """The names that have a class without being told, as long as the list is this one; "": one of other tables."""
+
+    def names(self) -> tuple[str, ...]:
+        """The list where none is written."""
+        return tuple(name for name, _ in self.defaults)
 
 
 LISTS: tuple[PluginList, ...] = (
-    PluginList("controller_server", "controller_plugins", ("FollowPath",)),
-    PluginList("controller_server", "goal_checker_plugins", ("goal_checker",)),
-    PluginList("controller_server", "progress_checker_plugins", ("progress_checker",)),
-    PluginList("controller_server", "path_handler_plugins", ("PathHandler",)),
-    PluginList("planner_server", "planner_plugins", ("GridBased",)),
-    PluginList("smoother_server", "smoother_plugins", ("simple_smoother",)),
-    PluginList("behavior_server", "behavior_plugins", ("spin", "backup", "drive_on_heading", "wait")),
-    PluginList(COSTMAP, "plugins", ("static_layer", "obstacle_layer", "inflation_layer")),
+    PluginList("controller_server", "controller_plugins", (("FollowPath", "DWBLocalPlanner"),)),
+    PluginList("controller_server", "goal_checker_plugins", (("goal_checker", "SimpleGoalChecker"),)),
+    PluginList("controller_server", "progress_checker_plugins", (("progress_checker", "SimpleProgressChecker"),)),
+    PluginList("controller_server", "path_handler_plugins", (("PathHandler", "FeasiblePathHandler"),)),
+    PluginList("planner_server", "planner_plugins", (("GridBased", "NavfnPlanner"),)),
+    PluginList("smoother_server", "smoother_plugins", (("simple_smoother", "SimpleSmoother"),)),
+    PluginList("behavior_server", "behavior_plugins", tuple(
+        (name, "") for name in ("spin", "backup", "drive_on_heading", "wait")
+    )),
+    PluginList(COSTMAP, "plugins", (
+        ("static_layer", "StaticLayer"), ("obstacle_layer", "ObstacleLayer"), ("inflation_layer", "InflationLayer"),
+    )),
     PluginList(COSTMAP, "filters"),
-)
-_SOURCE = "node_utils.hpp of Nav2, get_plugin_type_param: a name without a class is refused"
+)  # fmt: skip
+_DWB = "DWBLocalPlanner"
+_BY_DEFAULT = spanned("foxy-kilted", "ros2")
+"""Since lyrical a controller without a class is MPPI's (parameter_handler.hpp of nav2_controller)."""
+_NO_CRITICS = spanned("galactic-rolling", "ros2")
+"""dwb_local_planner.cpp of foxy has critics of its own where none are listed; later ones refuse that."""
+_SEVERAL = 2
+"""Values from which on they are told as one."""
+_CLASSLESS = "node_utils.hpp of Nav2, get_plugin_type_param: a name without a class is refused"
 
 
 def classless(file: ConfigFile, result: Scoped, shown: frozenset[str]) -> Iterator[Problem]:
@@ -49,7 +66,7 @@ def classless(file: ConfigFile, result: Scoped, shown: frozenset[str]) -> Iterat
             continue
         names = words_of(place.entry)
         lacking = [name for name in names if (*place.scope, name, "plugin") not in held and name not in anywhere]
-        if lacking and names != one.defaults:
+        if lacking and names != one.names():
             yield _classless(file, place, lacking)
 
 
@@ -68,4 +85,102 @@ def _classless(file: ConfigFile, place: Place, names: list[str]) -> Problem:
     below, their, them = ("each of these names", "their", "them") if names[1:] else (names[0], "its", "it")
     text = f"{place.name} names {', '.join(names)}, and nothing here says {their} class: {what} will not start."
     hint = f"Write plugin with the class below {below}, or leave {them} out of the list."
-    return problem_at("cannot-work", Severity.WARNING, file, place.entry, text, hint, _SOURCE)
+    return problem_at("cannot-work", Severity.WARNING, file, place.entry, text, hint, _CLASSLESS)
+
+
+# Values beside the list
+
+
+class Loaded(NamedTuple):
+    """A plugin of a node with who reads its values."""
+
+    name: str
+    owners: tuple[str, ...]
+    has_class: bool
+    """Whether the file says its class."""
+    instead_of: str
+    """The list that the file lacks, where the plugin is loaded without one; empty where it is listed."""
+
+    def reads(self, name: str) -> bool:
+        return any(navigation.known("ros2", owner, name) for owner in self.owners)
+
+
+class Raised(NamedTuple):
+    """Values that stand one level too high, and what is said of them."""
+
+    problem: Problem
+    places: Sequence[Place]
+
+
+def raised(file: ConfigFile, result: Scoped, shown: frozenset[str]) -> Iterator[Raised]:
+    """Values that a node does not read and one of its plugins does, where they are several.
+
+    Args:
+        shown: the releases that somebody or its plugins say the file is for; empty where nothing says so.
+    """
+    values = {split(entry): entry for entry in file.entries}
+    beside: dict[Keys, list[Place]] = {}
+    for place in result.places:
+        if place.scope and place.scope[-1] == PARAMETERS:
+            beside.setdefault(place.scope, []).append(place)
+    for scope, places in beside.items():
+        loaded = [one for each in LISTS if each.owner == scope[-2] for one in _loaded(each, scope, values, shown)]
+        unread = [one for one in places if _may_be_raised(one, scope, values)]
+        theirs = [(plugin, [one for one in unread if plugin.reads(one.name)]) for plugin in loaded]
+        plugin, most = max(theirs, key=lambda one: len(one[1]), default=(None, []))
+        if plugin is not None and len(most) >= _SEVERAL:
+            yield Raised(_raised(file, plugin, most, values, shown), most)
+
+
+def _loaded(one: PluginList, scope: Keys, values: Mapping[Keys, Entry], shown: frozenset[str]) -> Iterator[Loaded]:
+    """The plugins that a list loads, as far as somebody knows what they read."""
+    names = words_of(values.get((*scope, one.key))) or one.names()
+    for name in names:
+        plugin = values.get((*scope, name, "plugin"))
+        if plugin is not None:
+            owners = of_class(plugin, values, (*scope, name))
+        else:
+            kind = dict(one.defaults)[name] if names == one.names() else ""
+            owners = ("MPPIController" if kind == _DWB and shown and not shown & _BY_DEFAULT else kind,) if kind else ()
+        if owners and owners != (one.owner,):
+            yield Loaded(name, owners, plugin is not None, "" if (*scope, one.key) in values else one.key)
+
+
+def _may_be_raised(place: Place, scope: Keys, values: Mapping[Keys, Entry]) -> bool:
+    """Whether a node does not read a value itself: a plain one, or one of a critic that stands beside its list."""
+    first, dot, _ = place.name.partition(".")
+    if dot:
+        return not place.owners and first in words_of(values.get((*scope, "critics")))
+    return place.owners == (scope[-2],) and not navigation.known("ros2", scope[-2], place.name)
+
+
+def _raised(
+    file: ConfigFile, plugin: Loaded, places: Sequence[Place], values: Mapping[Keys, Entry], shown: frozenset[str]
+) -> Problem:
+    first, *more = places
+    scope = first.scope
+    lacking = [one for one in places if (*scope, plugin.name, *one.name.split(".")) not in values]
+    text = (
+        f"{first.name} and {len(more)} more stand beside {plugin.name}, not below it: {scope[-2]} does not read them, "
+        f"{plugin.owners[-1]} would."
+    )
+    if len(lacking) == len(places):
+        text += _consequence(plugin, lacking, shown)
+        hint = f"Write them one level deeper, below {plugin.name}"
+        hint += f": that is loaded where {plugin.instead_of} is missing." if plugin.instead_of else "."
+    elif lacking:
+        hint = f"Write those that {plugin.name} lacks below it, and leave the others out."
+    else:
+        hint = f"Leave them out: {plugin.name} has its own."
+    others = tuple(one.entry.name for one in more)
+    return problem_at("misplaced-key", Severity.WARNING, file, first.entry, text, hint, STACKS["ros2"], others)
+
+
+def _consequence(plugin: Loaded, lacking: Sequence[Place], shown: frozenset[str]) -> str:
+    """What comes of values that a plugin lacks: it has its defaults, and DWB does not start without critics."""
+    refusing = _NO_CRITICS if plugin.has_class else _NO_CRITICS & _BY_DEFAULT
+    refused = (shown or refusing) & refusing
+    if _DWB in plugin.owners and refused and any(one.name == "critics" for one in lacking):
+        where = "" if refused == shown else f" in {spans(refused, 'ros2')}"
+        return f" Without its critics controller_server does not start{where}."
+    return f" {plugin.name} has its defaults instead."

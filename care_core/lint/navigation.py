@@ -56,8 +56,12 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     told = frozenset({distribution} if distribution else ())
     shown = told or (plugins.shown(file) if result.ros == "ros2" else told)
     likely = told or _likely(result, shown)
+    raised = list(lists.raised(file, result, shown)) if result.ros == "ros2" else []
+    told_as_one = [place.entry for one in raised for place in one.places]
+    yield from (one.problem for one in raised)
     for place in result.places:
-        yield from _place(file, result, place, likely, shown, is_told=bool(told))
+        if not any(place.entry is entry for entry in told_as_one):
+            yield from _place(file, result, place, likely, shown, is_told=bool(told))
     for entry, key in result.not_loaded:
         name = split(entry)[-2]
         if _is_spare(file, entry):

@@ -168,7 +168,7 @@ def _part(keys: Keys, at: int, owners: Keys, values: Mapping[Keys, Entry]) -> Ke
     part, here = keys[at], keys[:at]
     plugin = values.get((*here, part, "plugin"))
     if plugin is not None:
-        return _of_class(plugin, values, (*here, part))
+        return of_class(plugin, values, (*here, part))
     for owner in owners:
         for key, reader in _SUB_OWNERS.get(owner, ()):
             if part in words_of(values.get((*here, key))):
@@ -183,7 +183,8 @@ def _part(keys: Keys, at: int, owners: Keys, values: Mapping[Keys, Entry]) -> Ke
     return None
 
 
-def _of_class(plugin: Entry, values: Mapping[Keys, Entry], here: Keys) -> Keys | None:
+def of_class(plugin: Entry, values: Mapping[Keys, Entry], here: Keys) -> Keys | None:
+    """Who reads the part of a plugin by its class; None where nobody knows."""
     name = class_of(str(plugin.value))
     if "nav2_behaviors" in str(plugin.value) or "nav2_recoveries" in str(plugin.value):
         return ("behavior_server",)

@@ -564,6 +564,74 @@ def test_a_proposed_name_is_one_of_the_releases_that_the_file_is_for(
     assert found.hint == ("Did you mean minimum_speed?" if proposed else "Check its spelling, or leave it out.")
 
 
+BESIDE = ("max_vel_x: 0.3", "acc_lim_x: 2.5", "critics: [RotateToGoal, BaseObstacle]", "BaseObstacle.scale: 0.02")
+
+
+@pytest.mark.parametrize(
+    ("lines", "target", "consequence"),
+    [
+        ((), "", " Without its critics controller_server does not start in galactic to kilted."),
+        ((), "humble", " Without its critics controller_server does not start."),
+        ((), "foxy", " FollowPath has its defaults instead."),
+        (("controller_plugins: [FollowPath]", f"FollowPath.plugin: {DWB}"), "",
+         " Without its critics controller_server does not start in galactic to rolling."),
+        (("controller_plugins: [FollowPath]", f"FollowPath.plugin: {DWB}"), "rolling",
+         " Without its critics controller_server does not start."),
+    ],
+)  # fmt: skip
+def test_values_beside_the_plugin_that_reads_them_are_told_as_one(
+    tmp_path: Path, lines: tuple[str, ...], target: str, consequence: str
+) -> None:
+    (found,) = findings(tmp_path, node("controller_server", *lines, *BESIDE), target)
+    assert (found.rule, found.line, len(found.others)) == ("misplaced-key", 3 + len(lines), 3)
+    assert found.text == (
+        "max_vel_x and 3 more stand beside FollowPath, not below it: controller_server does not read them, "
+        f"DWBLocalPlanner would.{consequence}"
+    )
+    where = "" if lines else ": that is loaded where controller_plugins is missing"
+    assert found.hint == f"Write them one level deeper, below FollowPath{where}."
+
+
+@pytest.mark.parametrize(
+    ("below", "hint"),
+    [
+        ((), "Write them one level deeper, below FollowPath."),
+        (("max_vel_x: 0.3",), "Write those that FollowPath lacks below it, and leave the others out."),
+        (("max_vel_x: 0.3", "acc_lim_x: 2.5"), "Leave them out: FollowPath has its own."),
+    ],
+)
+def test_values_that_the_plugin_has_itself_are_left_out(tmp_path: Path, below: tuple[str, ...], hint: str) -> None:
+    inner = ("FollowPath:", f"  plugin: {DWB}", *(f"  {line}" for line in below))
+    (found,) = findings(tmp_path, node("controller_server", "controller_plugins: [FollowPath]", *inner, *BESIDE[:2]))
+    assert (found.rule, found.hint) == ("misplaced-key", hint)
+
+
+@pytest.mark.parametrize(
+    ("text", "plugin"),
+    [
+        (node("planner_server", "tolerance: 0.5", "use_astar: false"), "GridBased"),
+        (node("controller_server", "vx_max: 0.5", "model_dt: 0.05", "controller_plugins: [Drive]",
+              f"Drive: {{plugin: {MPPI}}}"), "Drive"),
+        (node("controller_server", "vx_samples: 20", "sim_time: 1.7", "controller_plugins: [Drive]", "Drive:",
+              "  plugin: nav2_rotation_shim_controller::RotationShimController", f"  primary_controller: {DWB}"),
+         "Drive"),
+        (node("controller_server", "vx_samples: 20", "sim_time: 1.7", "controller_plugins: [Drive]",
+              "Drive: {plugin: 'my::Controller'}"), ""),
+        (node("controller_server", "vx_samples: 20", "sim_time: 1.7", "controller_plugins: [Drive]",
+              f"Drive: {{plugin: {MPPI}}}"), ""),
+        (node("controller_server", "sim_time: 1.7", "my_own: 1.7"), ""),
+    ],
+)  # fmt: skip
+def test_values_stand_beside_a_plugin_only_where_that_reads_several(tmp_path: Path, text: str, plugin: str) -> None:
+    beside = [one.text for one in findings(tmp_path, text) if " more stand beside " in one.text]
+    assert [one.partition(" beside ")[2].partition(",")[0] for one in beside] == ([plugin] if plugin else [])
+
+
+def test_without_a_class_the_controller_is_of_mppi_since_lyrical(tmp_path: Path) -> None:
+    (found,) = findings(tmp_path, node("controller_server", "vx_max: 0.5", "model_dt: 0.05"), "rolling")
+    assert "MPPIController would. FollowPath has its defaults instead." in found.text
+
+
 DIRECT = ("controller_plugins: [FollowPath]", "sim_time: 1.7", "FollowPath:", f"  plugin: {DWB}")
 
 
