@@ -134,7 +134,7 @@ def _place(
     if dead:
         yield problem_at("dead-key", Severity.WARNING, file, place.entry, *dead, _COSTMAP_SOURCE)
         return
-    yield from _value(file, place.entry, now or here or facts, ros)
+    yield from _value(file, place.entry, here or facts, ros)
 
 
 def _is_spare(file: ConfigFile, entry: Entry) -> bool:

@@ -663,6 +663,14 @@ def test_a_value_in_the_unit_of_another_release_is_converted(
     assert [(one.rule, one.hint) for one in found] == ([("wrong-type", hint)] if hint else [])
 
 
+@pytest.mark.parametrize("value", ["5.0", "5000"])
+@pytest.mark.parametrize("beside", ["", RECOVERIES])
+def test_no_error_rests_on_a_release_that_is_only_likely(tmp_path: Path, value: str, beside: str) -> None:
+    older = node("bt_navigator", "default_bt_xml_filename: a.xml") + node("controller_server", "goal_checker_plugin: a")
+    found = findings(tmp_path, node("map_saver", f"save_map_timeout: {value}") + older + beside)
+    assert [one.rule for one in found if one.severity != Severity.NOTE] == []
+
+
 @pytest.mark.parametrize(
     ("separator", "target", "rules"),
     [("/", "humble", ["unknown-key"]), ("/", "", []), ("::", "", ["wrong-type"]), ("::", "jazzy", ["wrong-type"])],
