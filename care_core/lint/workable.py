@@ -125,11 +125,13 @@ class Off(NamedTuple):
     why: str
     source: str
     rule: str = "hinders"
+    unless: str = ""
+    """What does without it, which no parameter file shows."""
 
 
 OFF: tuple[Off, ...] = (
-    Off(("amcl",), "tf_broadcast", "nobody tells where odom is on the map", "amcl publishes that transform",
-        "cannot-work"),
+    Off(("amcl",), "tf_broadcast", "it does not tell where odom is on the map", "amcl publishes that transform",
+        "cannot-work", "another node publishes that transform"),
     Off(("move_base",), "recovery_behavior_enabled", "a robot that is stuck gives up at once", "move_base.cpp"),
     Off(("StaticLayer",), "map_subscribe_transient_local", "a map that was sent before it listens never arrives",
         "static_layer.cpp; map_server sends its map once, and keeps it for those that ask"),
@@ -171,7 +173,8 @@ def _off(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
         if reader.is_a(*rule.owners) and reader.is_off(rule.name):
             entry = reader.values[rule.name]
             text = f"{rule.name} of {reader.owners[0]} is off: {rule.why}."
-            yield warning(rule.rule, file, entry, text, "Switch it on.", rule.source)
+            hint = f"Switch it on{f', unless {rule.unless}' if rule.unless else ''}."
+            yield warning(rule.rule, file, entry, text, hint, rule.source)
 
 
 # Several values beside each other

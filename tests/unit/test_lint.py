@@ -324,6 +324,12 @@ def test_values_with_which_a_robot_cannot_work_are_found(tmp_path: Path, text: s
     assert found == ([(rule, key)] if rule else [])
 
 
+def test_a_file_does_not_show_that_nobody_else_publishes_a_transform(tmp_path: Path) -> None:
+    (found,) = findings(tmp_path, "a.yaml", "amcl:\n  tf_broadcast: false\n")
+    assert found.text == "tf_broadcast of amcl is off: it does not tell where odom is on the map."
+    assert found.hint == "Switch it on, unless another node publishes that transform."
+
+
 MAPPED = "\n      static_layer: {{plugin: 'nav2_costmap_2d::StaticLayer', map_subscribe_transient_local: {}}}"
 LAYERED = """local_costmap:
   local_costmap:
