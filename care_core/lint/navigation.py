@@ -31,6 +31,7 @@ _COPIED = {
 """What a costmap hands on to a layer of that class from its own namespace (copyParentParameters)."""
 _SHAPE = "costmap_2d_ros.cpp of Nav2, getParameters, and makeFootprintFromParams of ROS 1 ask for a footprint first"
 _NAMESPACE = "costmap_2d_ros.cpp of Nav2 gives the node a namespace of its own name"
+_MODES = ("modes", "__DEFAULT__")
 _LOCAL = "local_costmap"
 _COSTMAP_SOURCE = "costmap_2d_ros.cpp of ros-planning/navigation (noetic)"
 
@@ -50,8 +51,9 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of ROS parameters."""
     result = scoped(file)
     distribution = distribution_of(target, result.ros)
-    if result.ros == "ros1" and (foreign := [one for one in file.entries if ROS2_ALONE.intersection(one.keys[:-1])]):
-        yield _no_parameters(file, foreign)
+    other = _no_parameters(file, result)
+    if other is not None:
+        yield other
         return
     told = frozenset({distribution} if distribution else ())
     shown = told or (plugins.shown(file) if result.ros == "ros2" else told)
@@ -77,17 +79,23 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     yield from values(file, result)
 
 
-def _no_parameters(file: ConfigFile, entries: Sequence[Entry]) -> Problem:
-    """Nodes of Nav2 in a file without the key that their parameters stand below: the file of something else, such as a
-    launch, or one whose values they would read, had they the key."""
-    node = next(key for key in entries[0].keys if key in ROS2_ALONE)
-    is_meant = any(
-        navigation.known("ros2", key, one.keys[-1]) for one in entries for key in one.keys if key in ROS2_ALONE
-    )
+def _no_parameters(file: ConfigFile, result: Scoped) -> Problem | None:
+    """A file of something else that names nodes of Nav2: the modes of system_modes, a launch, or values that nodes
+    would read, had they the key that ROS 2 asks for."""
+    modes = next((one for one in file.entries if _MODES in zip(one.keys, one.keys[1:], strict=False)), None)
+    if modes is not None:
+        text = "This is no parameter file: it holds the modes of nodes for system_modes, with the values of each."
+        hint = "Lint the parameter files of its nodes."
+        return problem_at("no-parameters", Severity.NOTE, file, modes, text, hint, "the model files of system_modes")
+    named = [(one, key) for one in file.entries for key in one.keys[:-1] if key in ROS2_ALONE]
+    if result.ros == "ros2" or not named:
+        return None
+    is_meant = any(navigation.known("ros2", key, one.keys[-1]) for one, key in named)
+    first, node = named[0]
     text = f"This is no parameter file of ROS 2: it names {node}, and nothing in it stands below {PARAMETERS}."
     hint = f"A parameter file has NODE: {PARAMETERS}: NAME: VALUE."
     severity = Severity.WARNING if is_meant else Severity.NOTE
-    return problem_at("no-parameters", severity, file, entries[0], text, hint)
+    return problem_at("no-parameters", severity, file, first, text, hint)
 
 
 def values(file: ConfigFile, result: Scoped) -> Iterator[Problem]:

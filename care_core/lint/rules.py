@@ -16,7 +16,7 @@ class Rule(NamedTuple):
 _TABLES = "the sources of each release, as tables"
 RULES: tuple[Rule, ...] = (
     Rule("syntax", "A line that the reader of the format refuses.", "the format: YAML, NAME VALUE, or five columns"),
-    Rule("no-parameters", "Nodes of Nav2 in a file without ros__parameters.", "ROS 2, parse.c: no value before it"),
+    Rule("no-parameters", "A file of something else that names nodes of Nav2.", "ROS 2 reads below ros__parameters"),
     Rule("duplicate", "The same parameter twice in one file.", "how the readers of the format work"),
     Rule("unknown-key", "A name that nothing reads in any release.", _TABLES),
     Rule("misplaced-key", "A name that is read elsewhere, but not at that place.", _TABLES),

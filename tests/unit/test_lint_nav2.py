@@ -199,6 +199,14 @@ def test_a_file_that_launches_nodes_is_no_parameter_file_and_nothing_else(tmp_pa
     assert found.text.startswith("This is no parameter file of ROS 2: it names bt_navigator")
 
 
+def test_the_modes_of_nodes_are_no_parameters(tmp_path: Path) -> None:
+    modes = ("type: node", "modes:", "  __DEFAULT__:", "    ros__parameters: {FollowPath.max_vel_x: 0.6}", "  SLOW:",
+             "    ros__parameters: {FollowPath.max_vel_x: -0.3}")  # fmt: skip
+    (found,) = findings(tmp_path, node("pilot", "type: system") + node("controller_server", *modes))
+    assert (found.rule, found.severity) == ("no-parameters", Severity.NOTE)
+    assert "system_modes" in found.text
+
+
 def test_values_of_a_node_without_the_key_that_ros_2_asks_for(tmp_path: Path) -> None:
     text = "controller_server:\n  controller_frequency: 20.0\namcl:\n  alfa1: 0.2\n"
     assert told(tmp_path, text) == [("no-parameters", "warning", "controller_frequency")]
