@@ -32,6 +32,10 @@ _LOADS = {
     "DWBLocalPlanner": "dwb_local_planner.cpp looks for critics in dwb_critics, with Critic added to their name",
     "MPPIController": "critic_manager.cpp looks for critics in mppi::critics alone",
 }
+_READS = {
+    _DWB: "trajectory_critic.hpp of dwb_core: a critic reads its values below the name that the list has for it",
+    "MPPIController": "critic_manager.cpp: a critic reads its values below the name that the list has for it",
+}
 
 
 def check(file: ConfigFile, distribution: str) -> Iterator[Problem]:
@@ -152,6 +156,7 @@ def _critics(file: ConfigFile, values: Mapping[Keys, Entry]) -> Iterator[Problem
         if owner in _CONTROLLERS:
             yield from _listed(file, values, here, owner)
             yield from _blind(file, values, here, owner)
+            yield from _unlisted(file, values, here, owner)
         if owner in _CONTROLLERS or owner in _WITHOUT:
             yield from _parts(file, values, here, owner)
 
@@ -167,6 +172,32 @@ def _listed(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: s
             text = f"{name} is a critic of {other}, not of {owner}: the controller does not load."
             hint = f"Leave it out, or load {other}."
             yield problem_at("plugin-name", Severity.ERROR, file, entry, text, hint, _LOADS[owner])
+
+
+def _unlisted(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
+    """Parameters of critics that the list does not name, or by another name: once for each critic."""
+    entry = values.get((*here, "critics"))
+    listed = words_of(entry)
+    seen: set[str] = set()
+    for keys, value in values.items():
+        if not listed or len(keys) < len(here) + 2 or keys[: len(here)] != here:
+            continue
+        name = keys[len(here)]
+        if name in seen or name in listed or not _is_critic(name, _CONTROLLERS[owner]):
+            continue
+        seen.add(name)
+        meant = next((one for one in listed if _plain(one) == _plain(name)), "")
+        if meant:
+            text = f"{name} is {meant} in the list of critics: nothing reads this part."
+            hint = f"Name the part {meant}, as the list does."
+            yield problem_at("misplaced-key", Severity.WARNING, file, value, text, hint, _READS[owner])
+        else:
+            text = f"Nothing loads {name}: the list of critics does not name it."
+            yield problem_at("not-loaded", Severity.NOTE, file, value, text, "Add it to critics, or leave it out.")
+
+
+def _plain(critic: str) -> str:
+    return critic.removesuffix("Critic")
 
 
 def _blind(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:

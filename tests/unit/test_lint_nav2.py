@@ -713,6 +713,29 @@ def test_a_controller_none_of_whose_critics_looks_at_obstacles(
     assert told(tmp_path, controller(plugin, *lines)) == ([("hinders", "warning", key)] if key else [])
 
 
+@pytest.mark.parametrize(
+    ("plugin", "lines", "wrong"),
+    [
+        (DWB, ("critics: [PathAlignCritic, BaseObstacle]", "PathAlign: {scale: 32.0, forward_point_distance: 0.1}"),
+         [("misplaced-key", "Name the part PathAlignCritic, as the list does.")]),
+        (DWB, ("critics: [PathAlign, BaseObstacle]", "PathAlignCritic: {scale: 32.0}"),
+         [("misplaced-key", "Name the part PathAlign, as the list does.")]),
+        (DWB, ("critics: [PathAlignCritic, BaseObstacle]", "PathAlignCritic.scale: 32.0"), []),
+        (DWB, ("critics: [BaseObstacle]", "GoalDist.scale: 24.0", "GoalDist.aggregation_type: last"),
+         [("not-loaded", "Add it to critics, or leave it out.")]),
+        (DWB, ("critics: [BaseObstacle, Ahead]", "Ahead: {class: GoalDist, scale: 24.0}"), []),
+        (DWB, ("GoalDist.scale: 24.0",), []),
+        (MPPI, ("critics: [CostCritic]", "GoalCritic: {cost_weight: 5.0}"),
+         [("not-loaded", "Add it to critics, or leave it out.")]),
+        (MPPI, ("critics: [CostCritic, GoalCritic]", "GoalCritic: {cost_weight: 5.0}"), []),
+    ],
+)  # fmt: skip
+def test_a_critic_reads_its_values_below_the_name_that_the_list_has(
+    tmp_path: Path, plugin: str, lines: tuple[str, ...], wrong: list[tuple[str, str]]
+) -> None:
+    assert [(one.rule, one.hint) for one in findings(tmp_path, controller(plugin, *lines))] == wrong
+
+
 LAYERS = {
     "map": "StaticLayer", "scan": "ObstacleLayer", "voxel": "VoxelLayer", "sonar": "RangeSensorLayer",
     "noise": "DenoiseLayer", "inflated": "InflationLayer", "again": "InflationLayer",
