@@ -12,7 +12,7 @@ from care_core.errors import UsageError, nearest
 from care_core.lint import contradictions, lists, plugins, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED
+from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED, Renamed
 from care_core.lint.scopes import COSTMAP, Place, Scoped, class_of, costmaps, scoped, split
 from care_core.lint.unread import unread
 from care_core.metadata import navigation
@@ -131,8 +131,10 @@ def _place(
             yield problem
         return
     now = [fact for fact in facts if navigation.distributions(fact, ros) & likely]
-    if not now:
-        problem = _other_distribution(file, result, place, facts, likely, is_told=is_told)
+    lasting = not is_told and _has_lasting_name(result, place, facts)
+    if not now or lasting:
+        meant = frozenset(DISTRIBUTIONS[ros]) if lasting else likely
+        problem = _other_distribution(file, result, place, facts, meant, is_told=is_told)
         if problem is not None:
             yield problem
     here = [fact for fact in facts if navigation.distributions(fact, ros) & shown]
@@ -166,12 +168,8 @@ def _other_distribution(
     severity = Severity.WARNING if is_told else Severity.NOTE
     order = DISTRIBUTIONS[result.ros]
     told = f"; the old name is not read in {next(iter(likely))}" if is_told else ""
-    renames = ROS1_RENAMED if result.ros == "ros1" else ROS2_RENAMED
-    generic = re.sub(r"^\w+\.", "<source>.", place.name)
-    for one in renames:
-        is_newer = any(order.index(name) >= order.index(one.since) for name in likely)
-        if one.owner in place.owners and one.old in (place.name, generic) and is_newer:
-            new = one.new.replace("<source>", place.name.partition(".")[0])
+    for one, new in _renames(result, place):
+        if any(order.index(name) >= order.index(one.since) for name in likely):
             text = f"{place.name} is {new} since {one.since}{told}."
             return problem_at(
                 "renamed", severity, file, place.entry, text, f"Write {new.rpartition('.')[2]}.", STACKS[result.ros]
@@ -184,6 +182,27 @@ def _other_distribution(
     )
     return problem_at(
         "unknown-key", severity, file, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
+    )
+
+
+def _renames(result: Scoped, place: Place) -> Iterator[tuple[Renamed, str]]:
+    """The new names of an old one."""
+    generic = re.sub(r"^\w+\.", "<source>.", place.name)
+    for one in ROS1_RENAMED if result.ros == "ros1" else ROS2_RENAMED:
+        if one.owner in place.owners and one.old in (place.name, generic):
+            yield one, one.new.replace("<source>", place.name.partition(".")[0])
+
+
+def _has_lasting_name(result: Scoped, place: Place, facts: Sequence[Fact]) -> bool:
+    """Whether the releases that read an old name read the new one as well: it is then right whatever the file is for,
+    and is told, unless the file has both."""
+    ros = result.ros
+    old = {name for fact in facts for name in navigation.distributions(fact, ros)}
+    held = {one.name for one in result.places if one.scope == place.scope}
+    return any(
+        old <= {name for fact in navigation.known(ros, one.owner, new) for name in navigation.distributions(fact, ros)}
+        for one, new in _renames(result, place)
+        if new not in held
     )
 
 

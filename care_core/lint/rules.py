@@ -45,15 +45,19 @@ class Renamed(NamedTuple):
     since: str
 
 
-ROS1_RENAMED: tuple[Renamed, ...] = tuple(
-    Renamed("DWAPlannerROS", old, new, "melodic")
-    for old, new in (
-        ("max_trans_vel", "max_vel_trans"), ("min_trans_vel", "min_vel_trans"), ("max_rot_vel", "max_vel_theta"),
-        ("min_rot_vel", "min_vel_theta"), ("rot_stopped_vel", "theta_stopped_vel"),
-        ("acc_limit_trans", "acc_lim_trans"),
-    )
+ROS1_RENAMED: tuple[Renamed, ...] = (
+    *(
+        Renamed("DWAPlannerROS", old, new, "melodic")
+        for old, new in (
+            ("max_trans_vel", "max_vel_trans"), ("min_trans_vel", "min_vel_trans"), ("max_rot_vel", "max_vel_theta"),
+            ("min_rot_vel", "min_vel_theta"), ("rot_stopped_vel", "theta_stopped_vel"),
+            ("acc_limit_trans", "acc_lim_trans"),
+        )
+    ),
+    Renamed("TrajectoryPlannerROS", "acc_lim_th", "acc_lim_theta", "kinetic"),
 )  # fmt: skip
-"""dwa_planner_ros.cpp of melodic and noetic warns of the old names and does not read them."""
+"""dwa_planner_ros.cpp of melodic and noetic warns of the old names and does not read them; indigo's
+trajectory_planner_ros.cpp warns of its old name and reads both."""
 
 ROS2_RENAMED: tuple[Renamed, ...] = (
     Renamed("behavior_server", "recovery_plugins", "behavior_plugins", "humble"),

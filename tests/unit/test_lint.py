@@ -68,6 +68,23 @@ def test_a_key_renamed_between_distributions_is_a_note_until_one_is_named(tmp_pa
     assert told(tmp_path, "b.yaml", rpp, "rolling") == [(6, "renamed", "warning")]
 
 
+@pytest.mark.parametrize(
+    ("key", "target", "found"),
+    [
+        ("acc_lim_th", "", [("renamed", "note")]),
+        ("acc_lim_th", "indigo", []),
+        ("acc_lim_th", "kinetic", [("renamed", "warning")]),
+        ("acc_lim_theta", "", []),
+        ("acc_lim_theta: 3.2\n  acc_lim_th", "", []),
+    ],
+)
+def test_a_new_name_that_older_releases_read_as_well_is_told_whatever_the_file_is_for(
+    tmp_path: Path, key: str, target: str, found: list[tuple[str, str]]
+) -> None:
+    text = f"TrajectoryPlannerROS:\n  max_vel_x: 0.45\n  min_in_place_rotational_vel: 0.4\n  {key}: 3.2\n"
+    assert [(rule, severity) for _, rule, severity in told(tmp_path, "a.yaml", text, target)] == found
+
+
 def test_a_key_that_another_plugin_reads_is_misplaced(tmp_path: Path) -> None:
     text = "global_costmap:\n  update_frequency: 5.0\n  meter_scoring: true\n"
     (found,) = findings(tmp_path, "a.yaml", text)
