@@ -71,7 +71,8 @@ def _paired(file: ConfigFile, result: Scoped, place: Place, paired: Paired) -> P
         text += ". That is missing here: the default plugins are loaded."
         hint = f"Write {paired.now} with the names, and plugin with its class below each name."
         if _have_classes(file, place.scope, words_of(beside.get(paired.names))):
-            hint = f"Name {paired.names} {paired.now}{f', and leave {paired.classes} out' if held[1:] else ''}."
+            rest = f" of {paired.names}, and leave {paired.classes} out" if held[1:] else ""
+            hint = f"Write {paired.now} instead{rest}."
     others = tuple(beside[name].name for name in held[1:])
     return problem_at("renamed", Severity.WARNING, file, place.entry, text, hint, PAIRED_SOURCE, others)
 
