@@ -286,7 +286,7 @@ def _read(
 
     progress("reading the log", 0.2)
     profile = with_own_limits(profile, request.site)
-    good = good_of(request.reference, profile) or _as_driven(request.since)
+    good = good_of(request.reference, profile) or _good_run(request, profile, model.log)
     judged = read_and_judge(
         model,
         profile,
@@ -360,24 +360,35 @@ def good_of(path: Path | None, profile: Profile) -> Good | None:
     CareError."""
     from care_core.configs.driven import readable
     from care_core.configs.loading import read_configs, resolve
-    from care_core.diagnose.reference import Good
+    from care_core.diagnose.reference import Good, reference_as_driven
     from care_core.logs.finding import is_log
 
     if path is None or is_log(path):
         return _as_driven(path)
     parameters = (parameter for option in profile.schema.options for parameter in readable(option))
-    return Good(resolve(read_configs((path,)), parameters), f"the configuration of {path.name}")
+    return Good(resolve(read_configs((path,)), parameters), reference_as_driven(path))
+
+
+def _good_run(request: Request, profile: Profile, log: Log) -> Good | None:
+    """The configuration of the run that is said to be good; None where its log tells otherwise, or of another vehicle:
+    then it says what changed, and no more."""
+    from care_core.diagnose.since import is_good
+    from care_core.logs.opening import open_log
+
+    if request.since is None or not is_good(open_log(request.since), log, profile, request.thresholds):
+        return None
+    return _as_driven(request.since)
 
 
 def _as_driven(path: Path | None) -> Good | None:
     """The configuration of a log, None where none was named. Raises CareError."""
-    from care_core.diagnose.reference import Good
+    from care_core.diagnose.reference import Good, reference_as_driven
     from care_core.logs.opening import open_log
 
     if path is None:
         return None
     settings = {name: history[-1] for name, history in open_log(path).settings().items()}
-    return Good(settings, f"the configuration of {path.name}")
+    return Good(settings, reference_as_driven(path))
 
 
 def _diagnose(reading: Reading, request: Request, robot: Robot | None, progress: Progress) -> Diagnosis:

@@ -288,6 +288,8 @@ class Since(Record):
     log: str
     changes: tuple[ParameterChange, ...]
     warnings: tuple[str, ...] = ()
+    is_reference: bool = False
+    """Whether the run was judged against the configuration of that log."""
 
 
 class Dismissal(Record):

@@ -10,6 +10,7 @@ faster.
 from __future__ import annotations
 
 from collections.abc import Collection, Container, Iterator, Mapping
+from pathlib import Path
 
 from care_core.causal.counterfactual import Config
 from care_core.causal.model import Model
@@ -31,6 +32,11 @@ class Good(Record):
 
     settings: Mapping[str, Setting]
     source: str
+
+
+def reference_as_driven(path: str | Path) -> str:
+    """Whose configuration it is that a log was driven with, in one phrase."""
+    return f"the configuration of {Path(path).name}"
 
 
 class Reference(Record, eq=False):

@@ -8,9 +8,11 @@ from pathlib import Path
 from care_core.configs.driven import readable, same_value
 from care_core.diagnose.judging import Judged, read_and_judge
 from care_core.diagnose.records import Cause, Diagnosis, Note, ParameterChange, Since
+from care_core.diagnose.reference import reference_as_driven
 from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.vehicles import vehicle_of
 from care_core.ecosystems.vehicles.self_written import is_self_written
-from care_core.errors import CareError
+from care_core.errors import CareError, UsageError
 from care_core.extract.read import log_info
 from care_core.logs.base import Log
 from care_core.logs.digest import log_digest
@@ -43,7 +45,28 @@ def compare(judged: Judged, good: Log, profile: Profile) -> Since:
         log=str(good.path),
         changes=changed_parameters(before, run.settings, profile.schema.options),
         warnings=(*_strange(run, other.run.log, before), *_not_good(other)),
+        is_reference=judged.reference.source == reference_as_driven(good.path),
     )
+
+
+def is_good(good: Log, log: Log, profile: Profile, thresholds: Mapping[str, float] | None) -> bool:
+    """Whether the log of a run that is said to be good holds a run that missed nothing: only then is its configuration
+    one to judge by. Raises UsageError where it is of another kind of robot."""
+    one, other_kind = _kind(log), _kind(good)
+    if one != other_kind:
+        what = f"That is the log of a {other_kind}, and this one is of a {one}."
+        raise UsageError(what, hint="Name a good run of the same robot.", where=str(good.path))
+    try:
+        other = read_and_judge(run_model(good), profile, thresholds=thresholds)
+    except CareError:
+        return True  # no mission, as of a log that was written on the bench: its parameters are what was vouched for
+    return not any(result.status == "fault" for result in (*other.results, *other.checks))
+
+
+def _kind(log: Log) -> str:
+    """What kind of robot wrote a log."""
+    ecosystem = log.format.ecosystem
+    return "robot under ROS" if ecosystem == "ros" else vehicle_of(log.facts, log.settings()).kind or ecosystem
 
 
 def with_evidence(diagnosis: Diagnosis, since: Since) -> Diagnosis:

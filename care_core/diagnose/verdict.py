@@ -8,14 +8,15 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import Literal, Protocol, TypeVar
 
 from care_core.diagnose.next_step import next_step
-from care_core.diagnose.records import Confidence, Diagnosis, Hypothesis, Status
+from care_core.diagnose.records import Confidence, Diagnosis, Hypothesis, Since, Status
 from care_core.ecosystems.findings import WHOLE_LOG, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
-from care_core.records import Record
+from care_core.records import Record, replace
 from care_core.run import FIT_WORDS, Fit, FitVerdict
 from care_core.text import clean, log_time, percent
 
@@ -152,6 +153,8 @@ class Verdict(Record):
     next_step: str
     others: str = ""
     """Which other missions of the log failed, empty where none did."""
+    against: str = ""
+    """Whose configuration it was judged against, where that is not the profile's own reference."""
 
     @property
     def word(self) -> str:
@@ -179,7 +182,7 @@ class Verdict(Record):
     def lines(self) -> tuple[str, ...]:
         """The verdict as every report begins."""
         next_step = f"Next: {self.next_step}" if self.next_step else ""
-        return tuple(filter(None, (self.headline, self.others, str(self.advice), next_step, self.fit)))
+        return tuple(filter(None, (self.headline, self.against, self.others, str(self.advice), next_step, self.fit)))
 
     @property
     def in_short(self) -> str:
@@ -198,7 +201,7 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
     status = status_of({one.status for one in objectives}, {one.severity for one in findings}, fit.verdict)
     own = diagnosis.run.mission.index
     missions = diagnosis.missions
-    return compose(
+    verdict = compose(
         diagnosis.profile.title,
         fit,
         objectives,
@@ -208,6 +211,13 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
         next_step(diagnosis, has_failed=status == "fault"),
         [(m.mission.index, m.reason) for m in missions if m.status == "fault" and m.mission.index != own],
     )
+    return replace(verdict, against=_against(diagnosis.since))
+
+
+def _against(since: Since | None) -> str:
+    if since is None or not since.is_reference:
+        return ""
+    return f"Judged against the configuration of {Path(since.log).name}, not against the profile's own reference"
 
 
 def why_of(shown_by: str, abstained: str | None, otherwise: str) -> str:
