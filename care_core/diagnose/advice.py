@@ -19,6 +19,7 @@ from care_core.diagnose.fixes import (
     to_fix,
 )
 from care_core.diagnose.judging import Judged
+from care_core.diagnose.next_step import KEPT
 from care_core.diagnose.outside.change import Advisable, check_first, outside_fix
 from care_core.diagnose.parts import mend_first, set_wrong, was_refused
 from care_core.diagnose.promise import Promise
@@ -207,7 +208,7 @@ def _abstains(
             "no parameter that this profile models explains the fault: look at what the run met "
             "(wind, battery, positioning, obstacles) or at parameters outside the profile"
         )
-    pinned = f", with {', '.join(sorted(failed.query.kept))} kept as it is" if failed.query.kept else ""
+    pinned = f", with {', '.join(sorted(failed.query.kept))}{KEPT}" if failed.query.kept else ""
     broken = [fault.objective for fault in faults]
     best = nearest(promised(_resets(failed, faults), promise), broken)
     short = falls_short(best, broken, as_driven) if best else None

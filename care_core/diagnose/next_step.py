@@ -18,6 +18,7 @@ from care_core.text import listed
 UPSETS: frozenset[FindingKind] = frozenset(("attitude", "crash", "motor", "takeoff", "thrust"))
 """Kinds of findings after which a vehicle may be damaged, or does not do what it is told."""
 REFUSED = "arming was refused: "
+KEPT = " kept as it is"
 _UPSET_MESSAGES = frozenset(("crash", "thrust"))
 
 
@@ -100,11 +101,19 @@ def _undone(diagnosis: Diagnosis) -> str:
     if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
     named = first if first is not None and first.what == "parameter" and first.name else None
+    if named is not None and _is_kept(named.name, diagnosis):
+        return f"let {named.name} change as well: without it nothing is likely enough"
     if named is not None and any(one.title.startswith(named.name) or _names(one, named.name) for one in findings):
         return f"put {named.name} back as the findings say"
     if named is not None and named.name not in diagnosis.run.config:
         return _looked_at(named.name, diagnosis)
     return ""
+
+
+def _is_kept(name: str, diagnosis: Diagnosis) -> bool:
+    """Whether the operator wants a parameter to stay, and for that nothing is advised."""
+    _, _, kept = (diagnosis.abstained or "").removesuffix(KEPT).rpartition(", with ")
+    return (diagnosis.abstained or "").endswith(KEPT) and name in kept.split(", ")
 
 
 def _names(finding: Finding, parameter: str) -> bool:

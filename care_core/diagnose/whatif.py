@@ -67,6 +67,12 @@ class Question(Record, eq=False):
         query = self.query
         config = {**query.config, **changes}
         then, now = self._odds([config, query.config])
+        outlooks = tuple(
+            Outlook(result, prediction(query, name, config), prediction(query, name, query.config))
+            for result in self.objectives
+            if (name := result.variable.name) in query.model.outcomes
+        )
+        least = min((one.predicted.p_ok for one in outlooks if one.predicted.p_ok is not None), default=1.0)
         return Answer(
             changes=tuple(
                 Change(
@@ -79,12 +85,8 @@ class Question(Record, eq=False):
                 )
                 for name, value in changes.items()
             ),
-            outlooks=tuple(
-                Outlook(result, prediction(query, name, config), prediction(query, name, query.config))
-                for result in self.objectives
-                if (name := result.variable.name) in query.model.outcomes
-            ),
-            p_ok=float(then),
+            outlooks=outlooks,
+            p_ok=min(float(then), least),
             p_ok_now=float(now),
         )
 
@@ -138,7 +140,7 @@ def parse_change(text: str, schema: Schema) -> tuple[str, float]:
     """`OPTION=VALUE` as an operator types it: the option or one of its parameters; true and labels are values too.
 
     Raises:
-        UsageError: no such option (the nearest is named), or no such value.
+        UsageError: no such option (the nearest is named), no such value, or one that is not acceptable.
     """
     name, _, value = (part.strip() for part in text.partition("="))
     option = option_named(name, schema)
@@ -149,6 +151,8 @@ def parse_change(text: str, schema: Schema) -> tuple[str, float]:
             hint=f"Write {option.name}=VALUE; acceptable are {option.acceptable}.",
             where="--set",
         )
+    if not option.accepts(number):
+        raise UsageError(f"{option.name} cannot be {value}.", hint=f"Ask for {option.acceptable}.", where="--set")
     return option.name, number
 
 

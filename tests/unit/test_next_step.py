@@ -98,3 +98,12 @@ def test_a_change_that_was_chosen_by_hand_does_not_come_before_what_failed() -> 
     chosen = replace(failed(THRUST, fixed=True), abstained="too little thrust: nothing is changed until that is mended")
     assert next_step(chosen, has_failed=True).startswith("check on the bench: too little thrust; then try it")
     assert "chosen by hand; no change is advised: too little thrust" in str(verdict_of(chosen).advice)
+
+
+def test_a_parameter_that_is_to_stay_is_not_put_back() -> None:
+    slow = Finding("attitude", "it came down slowly", 1.0, 2.0, "warning", "", "", "parameter", wanted=(("A", 40.0),))
+    named = Hypothesis("parameter", "A", 0.97)
+    kept = replace(failed(slow), hypotheses=(named,), abstained="nothing is likely enough, with A, B kept as it is")
+    assert next_step(kept, has_failed=True) == "let A change as well: without it nothing is likely enough"
+    free = replace(kept, abstained="nothing is likely enough")
+    assert next_step(free, has_failed=True) == "put A back as the findings say"
