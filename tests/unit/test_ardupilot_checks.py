@@ -946,3 +946,24 @@ def test_a_submarine_that_leaks() -> None:
     dive.rows["ERR"] = [(60.0, {"Subsys": 27.0, "ECode": 1.0})]
     (found,) = [one for one in every_finding(dive.find()) if one.kind == "leak"]
     assert (found.onset_s, found.severity) == (60.0, "critical")
+
+
+@pytest.mark.parametrize(("out", "told"), [(-0.5, True), (0.5, False)])
+def test_a_turn_that_its_own_control_drives_on_is_told(out: float, told: bool) -> None:
+    made = Made()
+    turns = np.where((made.t > 40.0) & (made.t < 60.0), 30.0 + 3.0 * (made.t - 40.0), 0.0)
+    pushes = np.where(turns > 0, out, 0.0)
+    zero = np.zeros_like(made.t)
+    made.table["RATE"] = {"R": zero, "P": zero, "RDes": zero, "PDes": zero, "ROut": zero, "POut": zero,
+                          "Y": turns, "YDes": np.sign(pushes) * 60.0, "YOut": pushes}  # fmt: skip
+    assert ("it spins against its control" in [one.title for one in made.find()]) is told
+
+
+def test_what_idles_on_the_ground_has_no_weak_motor() -> None:
+    made = Made()
+    for table in made.table.values():
+        for height in {"Alt", "BAlt", "RelHomeAlt"} & table.keys():
+            table[height] = np.full_like(table[height], 20.0)
+    made.table["CTUN"]["ThO"][:] = 0.05
+    made.table["RCOU"]["C1"] = 1250 + 8 * np.clip(made.t - 20, 0, 40)  # an integrator that winds up
+    assert "motor" not in [one.kind for one in made.find()]

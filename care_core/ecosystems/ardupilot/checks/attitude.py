@@ -23,7 +23,7 @@ from care_core.numbers import median
 
 READS: Wanted = {
     "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
-    "RATE": ("R", "P", "RDes", "PDes", "ROut", "POut"),
+    "RATE": ("R", "P", "Y", "RDes", "PDes", "YDes", "ROut", "POut", "YOut"),
     "STER": ("TurnRate", "DesTurnRate", "SteerOut"),
 }
 
@@ -33,6 +33,10 @@ _LASTS_S = LIMITS.add("shortest time off the demand", 1.0, "s", "a choice: a gus
 _FLICK_S = LIMITS.add("pause that ends it", 0.3, "s", "a choice: flicks of a stick follow each other more slowly")
 YAW_DEG = LIMITS.add("heading off its demand", 45.0, "deg", "a choice: turns to a new heading come nearer")
 _YAW_LASTS_S = LIMITS.add("shortest time off the heading", 3.0, "s", "a choice")
+_SPINS_DPS = LIMITS.add("turn against its control", 40.0, "deg/s", "a choice: gusts turn it slower")
+_PUSHES = LIMITS.add("output that is to turn it back", 0.2, "of the range", "a choice: less hardly turns it")
+_SPINS_S = LIMITS.add("shortest turn against its control", 2.0, "s", "a choice: a blow is countered sooner")
+_TURNED = LIMITS.add("probability of wrong turning directions", 0.7, "", "a choice: yaw that is spent shows alike")
 _WAVERS_DEG = LIMITS.add("heading that wavers in a turn", 10.0, "deg", "a choice")
 _NEARER = LIMITS.add("share of the error left after a turn", 0.6, "", "a choice")
 _OFF = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
@@ -69,6 +73,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         yield from _lost(flight, flight.lost_control_s)
     yield from _upside_down(flight)
     yield from _steering(flight)
+    if flight.is_copter or flight.kind == "quadplane":
+        yield from _spins(flight)
     if not flight.is_copter:
         return
     swung = list(swings(flight))
@@ -167,6 +173,38 @@ def _yaw(flight: Flight) -> Iterator[Finding]:
             evidence=f"up to {top(off[during(spans, table.t)]):.0f} deg off (limit {YAW_DEG:g})",
             source="ATT.Yaw against DesYaw",
             probability=_OFF,
+        )
+
+
+def _spins(flight: Flight) -> Iterator[Finding]:
+    """A turn that goes on, and faster, though the motors are told to turn it back: they turn it on."""
+    table = flight.one("RATE", "Y", "YDes", "YOut")
+    if table is None:
+        return
+    t, rate, out = table.t, table["Y"], table["YOut"]
+    against = (np.abs(rate) > _SPINS_DPS) & (rate * out < 0) & (np.abs(out) > _PUSHES)
+    against &= (np.abs(rate - table["YDes"]) > _SPINS_DPS) & during(flight.flown, t)
+    spans = [
+        (start, end)
+        for start, end in lasting(t, against, _SPINS_S)
+        if np.abs(np.interp(end, t, rate)) > np.abs(np.interp(start, t, rate))
+    ]
+    if spans:
+        start, end = spans[0]
+        most = float(np.max(np.abs(rate[(t >= start) & (t <= end)])))
+        yield Finding(
+            kind="attitude",
+            title="it spins against its control",
+            onset_s=start,
+            end_s=end,
+            severity="critical",
+            evidence=(
+                f"it turns faster and faster, up to {most:.0f} deg/s, with the motors told to turn it back: motors or "
+                "propellers of the wrong turning direction, or a frame type that is not its own"
+            ),
+            source="RATE.Y, YDes, YOut",
+            suspect="operation",
+            probability=_TURNED,
         )
 
 
