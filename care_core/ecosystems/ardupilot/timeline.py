@@ -288,7 +288,8 @@ def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | 
     if known is None or flight.kind in ("rover", "sub"):
         return None
     t, height = known
-    inside = np.flatnonzero((t >= start) & (t <= end) & np.isfinite(height))
+    down_s = end if flight.impact_s is None else max(flight.impact_s, start)  # a barometer drifts on as it lies
+    inside = np.flatnonzero((t >= start) & (t <= min(end, down_s)) & np.isfinite(height))
     if len(inside) < 3:
         return None
     t, height = t[inside], height[inside]

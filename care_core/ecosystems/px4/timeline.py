@@ -123,8 +123,9 @@ def _landings(flight: Px4Flight) -> Iterator[Event]:
                 else ("the land detector sees the ground again", "the land detector sees no ground")
             )
             yield Event(t, "flight", said[not landed], LANDED)
-    for span in flight.armed:
-        heights = flight.heights(span)
+    for start, end in flight.armed:
+        killed_s = flight.killed_s((start, end))
+        heights = flight.heights((start, end if killed_s is None else killed_s))
         top = 0 if heights is None else int(np.argmax(heights["height"]))
         if heights is not None and heights["height"][top] > AIRBORNE_M:
             yield Event(float(heights.t[top]), "flight", f"highest point, {heights['height'][top]:.1f} m", POSITION)
