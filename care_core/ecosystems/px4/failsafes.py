@@ -23,6 +23,7 @@ _CRITICAL_WARNING = {"battery_warning": 2}
 """battery_warning counts from critical on (battery_status.msg); the others are true or false."""
 _NEAR_S, _ROSE_S = 1.0, 0.3
 """A failsafe acts within a second of its reason; what it is told by rose just before."""
+_MOST = 2
 _LINKS = {
     "manual_control_signal_lost": "radio",
     "gcs_connection_lost": "ground station",
@@ -41,7 +42,8 @@ def reasons(flight: Px4Flight, acted_s: float) -> tuple[str, ...]:
 
 
 def in_words(flight: Px4Flight, acted_s: float) -> str:
-    """The same in a word or two: by the flags that rose with it, else by those that were up; empty where none was."""
+    """The same in a word or two: by the flags that rose with it, else by those that were up; empty where none was, or
+    where so many were that none tells."""
     rose = tuple(
         flag
         for flags in REASONS.values()
@@ -49,4 +51,5 @@ def in_words(flight: Px4Flight, acted_s: float) -> str:
         if any(value > 0 and abs(t - acted_s) < _ROSE_S for t, value in flight.changes(FLAGS, flag))
     )
     words = [_LINKS.get(flag) or next(about for about, flags in REASONS.items() if flag in flags) for flag in rose]
-    return " and ".join(dict.fromkeys(words or reasons(flight, acted_s)))
+    told = dict.fromkeys(words or reasons(flight, acted_s))
+    return " and ".join(told) if len(told) <= _MOST else ""
