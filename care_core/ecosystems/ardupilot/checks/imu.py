@@ -51,9 +51,7 @@ _ACC_PER_VIBE = LIMITS.add("difference that vibration adds, for each m/s^2", 0.3
 _OF_RATE = LIMITS.add("share of a rate that two gyros differ by", 0.06, "", "MPU-6000: sensitivity +-3 % each")
 _FAST_DPS = LIMITS.add("rate below which that is nothing", 30.0, "deg/s", "a choice: noise is more")
 _CALM_S = LIMITS.add("time in which it hardly turns that tells of noise", 1.0, "s", "a choice")
-_AT_REST = LIMITS.add(
-    "share of a noise that is there where it hardly turns, too", 0.5, "", "a choice: the middle is less"
-)
+_AT_REST = LIMITS.add("share of the limit that is there where it hardly turns", 0.3, "", "sound gyros have 0.02 deg/s")
 _TURNS_OVER_S = LIMITS.add("left out before control was lost", 3.0, "s", "a choice: it turns too fast to compare")
 _USUAL_VIBE = LIMITS.add("vibration where none is recorded", 15.0, "m/s^2", "a choice: half of what is acceptable")
 _SHAKEN_DPS = LIMITS.add("shaking that hides an offset", 20.0, "deg/s", "a choice: gyros are not sampled at once")
