@@ -967,3 +967,28 @@ def test_what_idles_on_the_ground_has_no_weak_motor() -> None:
     made.table["CTUN"]["ThO"][:] = 0.05
     made.table["RCOU"]["C1"] = 1250 + 8 * np.clip(made.t - 20, 0, 40)  # an integrator that winds up
     assert "motor" not in [one.kind for one in made.find()]
+
+
+@pytest.mark.parametrize(("at_s", "told"), [(50.0, True), (2.0, False)])
+def test_motors_that_the_emergency_switch_stops_in_the_air_are_told(at_s: float, told: bool) -> None:
+    made = Made()
+    made.settings["RC8_OPTION"] = 31
+    made.table["RCIN"] = {f"C{n}": np.full_like(made.t, 1500.0) for n in range(1, 15)}
+    made.table["RCIN"]["C8"] = np.where(made.t > at_s, 1934.0, 1094.0)
+    title = "the emergency switch stopped the motors in the air"
+    assert (title in [one.title for one in made.find()]) is told
+    recorded = Made()
+    recorded.rows["EV"] = [(at_s, {"Id": 54.0})]
+    assert (title in [one.title for one in recorded.find()]) is told
+
+
+def test_a_blow_that_stops_it_is_no_vibration() -> None:
+    made = Made()
+    hit = made.t >= 50.0
+    made.table["VIBE"]["VibeX"] = np.where(hit, 300.0 * np.exp(-(made.t - 50.0)), 0.1)
+    made.table["VIBE"]["Clip"] = np.where(hit, 3.0, 0.0)
+    made.table["GPS"]["Spd"] = np.where(hit, 0.1, 4.0)
+    made.table["ATT"]["Roll"] = np.where(made.t > 52.5, 70.0, made.table["ATT"]["Roll"])
+    found = [one for finding in made.find() for one in (finding, *finding.below)]
+    assert "vibration" not in [one.kind for one in found]
+    assert made.flight().struck_s == pytest.approx(50.0, abs=0.2)

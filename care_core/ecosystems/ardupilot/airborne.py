@@ -434,12 +434,16 @@ class Airborne(Armed):
         if lost is None:
             return None
         blows = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost]
-        hard = (t for t, felt in blows if t >= lost - _STRUCK_S or felt > _HARD * _SHOCK or self._stops_at(t))
+        hard = (
+            t
+            for t, felt in blows
+            if (felt > _SHOCK and t >= lost - _STRUCK_S) or felt > _HARD * _SHOCK or self._stops_at(t)
+        )
         return min(hard, default=None)
 
     def _blows(self) -> Iterator[tuple[float, float]]:
-        """Each time in the air that it was shaken beyond what flight does, and by how much, m/s^2; of a sensor whose
-        range that exceeded, the least that it was."""
+        """Each time in the air that it was shaken beyond what flight does, and by how much, m/s^2; 0 where all that is
+        told is that a sensor clipped, which vibration does as well."""
         table = self.one("IMU", "AccX", "AccY", "AccZ")
         if table is not None:
             felt = np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
@@ -447,15 +451,15 @@ class Airborne(Armed):
             yield from zip(table.t[shaken].tolist(), felt[shaken].tolist(), strict=True)
         for one in self.all("VIBE", "Clip"):
             clipped = np.append(False, np.diff(one["Clip"]) > 0) & during(self.airborne, one.t)
-            yield from ((t, _SHOCK) for t in one.t[clipped].tolist())
+            yield from ((t, 0.0) for t in one.t[clipped].tolist())
 
     def _stops_at(self, at: float) -> bool:
         """Whether it moved over ground until a time, and stood just after it."""
         moved = self.one("GPS", "Spd")
         if moved is None:
             return False
-        before = moved["Spd"][(moved.t > at - _STOPS_S) & (moved.t <= at)]
-        after = moved["Spd"][(moved.t > at) & (moved.t < at + _STOPS_S)]
+        before = moved["Spd"][(moved.t > at - _STOPS_S) & (moved.t < at)]
+        after = moved["Spd"][(moved.t >= at) & (moved.t < at + _STOPS_S)]
         if not len(before) or not len(after):
             return False
         return float(before[-1]) > _MOVES_MS and float(np.min(after)) < _STOPPED * float(before[-1])

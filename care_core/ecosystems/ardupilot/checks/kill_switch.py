@@ -1,0 +1,56 @@
+"""Motors that somebody stopped in the air by the emergency switch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+
+_CHANNELS = range(5, 15)
+READS: Wanted = {"EV": ("Id",), "RCIN": tuple(f"C{n}" for n in _CHANNELS)}
+LIMITS = Limits()
+_HIGH_US = LIMITS.add("pulse of a switch that is on", 1800.0, "us", "RC_Channel.h: AUX_SWITCH_PWM_TRIGGER_HIGH")
+_OFF_US = LIMITS.add("pulse of a switch that is off", 1200.0, "us", "RC_Channel.h: AUX_SWITCH_PWM_TRIGGER_LOW")
+_ALOFT_M = LIMITS.add("height", 1.0, "m", "a choice: lower, a landing leg may touch")
+_STOPPED, _EMERGENCY_STOP = 54, 31
+"""LogEvent::MOTORS_EMERGENCY_STOPPED, and the function of a switch that stops the motors (RC_Channel.h)."""
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The first time that the switch was thrown while it flew."""
+    if not (flight.is_copter or flight.kind == "quadplane"):
+        return
+    thrown = sorted((*flight.events(_STOPPED), *_switched(flight)))
+    stopped_s = next((t for t in thrown if any(start <= t <= end for start, end in flight.airborne)), None)
+    height_m = None if stopped_s is None or flight.height is None else float(np.interp(stopped_s, *flight.height))
+    if stopped_s is not None and (height_m is None or height_m > _ALOFT_M):
+        yield Finding(
+            kind="crash",
+            title="the emergency switch stopped the motors in the air",
+            onset_s=stopped_s,
+            end_s=flight.end_s,
+            severity="critical",
+            evidence="its switch was thrown" + ("" if height_m is None else f", {height_m:.1f} m up"),
+            source="EV 54; RCIN of the switch with option 31",
+            suspect="operation",
+            probability=0.9,
+        )
+
+
+def _switched(flight: Flight) -> Iterator[float]:
+    """When the switch that stops the motors was thrown, by what the receiver hears."""
+    for n in _CHANNELS:
+        if flight.setting(f"RC{n}_OPTION", f"CH{n}_OPT") != _EMERGENCY_STOP:
+            continue
+        heard = flight.one("RCIN", f"C{n}")
+        if heard is not None and len(heard) > 1:
+            pulse = heard[f"C{n}"]
+            yield from heard.t[1:][(pulse[1:] > _HIGH_US) & (pulse[:-1] < _OFF_US)].tolist()
+
+
+CHECK = Check("kill switch", "motors stopped in the air by the emergency switch", READS, LIMITS, find)
