@@ -433,24 +433,22 @@ class Airborne(Armed):
         lost = self.lost_control_s
         if lost is None:
             return None
-        blows = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost]
-        hard = (
-            t
-            for t, felt in blows
-            if (felt > _SHOCK and t >= lost - _STRUCK_S) or felt > _HARD * _SHOCK or self._stops_at(t)
-        )
-        return min(hard, default=None)
+        before = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost]
+        just_before = (t for t, felt in before if felt > _SHOCK and t >= lost - _STRUCK_S)
+        flown = [(t, felt) for t, felt in before if any(start <= t <= end for start, end in self.airborne)]
+        hard = (t for t, felt in flown if felt > _HARD * _SHOCK or self._stops_at(t))
+        return min((*hard, *just_before), default=None)
 
     def _blows(self) -> Iterator[tuple[float, float]]:
-        """Each time in the air that it was shaken beyond what flight does, and by how much, m/s^2; 0 where all that is
+        """Each time that it was shaken beyond what flight does, and by how much, m/s^2; 0 where all that is
         told is that a sensor clipped, which vibration does as well."""
         table = self.one("IMU", "AccX", "AccY", "AccZ")
         if table is not None:
             felt = np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
-            shaken = (felt > _SHOCK) & during(self.airborne, table.t)
+            shaken = felt > _SHOCK
             yield from zip(table.t[shaken].tolist(), felt[shaken].tolist(), strict=True)
         for one in self.all("VIBE", "Clip"):
-            clipped = np.append(False, np.diff(one["Clip"]) > 0) & during(self.airborne, one.t)
+            clipped = np.append(False, np.diff(one["Clip"]) > 0)
             yield from ((t, 0.0) for t in one.t[clipped].tolist())
 
     def _stops_at(self, at: float) -> bool:
