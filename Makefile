@@ -10,16 +10,20 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test sweep check bench docs profiles screenshots man walk fuzz mutate damage kills matrix offline dist sbom clean
+.PHONY: demo test long sweep check bench docs profiles screenshots man walk fuzz mutate damage kills matrix offline dist sbom clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
 
 # What is compiled once serves every process that a test starts, also where the environment asks to keep nothing.
-test sweep: export PYTHONDONTWRITEBYTECODE :=
+test long sweep: export PYTHONDONTWRITEBYTECODE :=
 
 test: $(DEV)
-	$(BIN)/pytest -n 3 --dist worksteal
+	$(BIN)/pytest -n 3 --dist worksteal -m "not long"
+
+# What goes through every document, every hostile file and every key, and through what is recorded.
+long: $(DEV)
+	$(BIN)/pytest -n 3 --dist worksteal -m long
 
 # The same with everything that the tests take a sample of, and with new examples of what must hold for any.
 sweep: $(DEV)

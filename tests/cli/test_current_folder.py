@@ -17,6 +17,8 @@ from tests.campaigns import COPY, campaign_in
 from tests.strangers_folder import MARK, plant, what_ran
 from tests.tui.test_serve import causes_behind, serve
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
 

@@ -36,6 +36,8 @@ from tests import nav2_drive, restamped
 from tests.groundstation import write_tlog
 from tests.rewritten import write_ulog
 
+pytestmark = pytest.mark.long
+
 DATA = Path(__file__).parents[1] / "data"
 SECONDS = 10.0
 CUTS = FLIPS = int(os.environ.get("CARE_DAMAGE", "25"))

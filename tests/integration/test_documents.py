@@ -14,6 +14,8 @@ from care_core.collect.campaign import _Campaign
 from care_core.profile.schema_file import _Profile, _Variable
 from care_tui.settings import Settings
 
+pytestmark = pytest.mark.long
+
 _LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
 
 

@@ -11,6 +11,8 @@ from tests import hostile
 from tests.bounded import MOST_MB, MOST_S, Answer, bounded
 from tests.whole import one_in
 
+pytestmark = pytest.mark.long
+
 INSPECTED = one_in(3, hostile.LOGS, first=2)
 """What triage reads of a log, inspection reads as well: so many will do."""
 

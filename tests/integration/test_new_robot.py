@@ -23,6 +23,8 @@ from care_samples.robot.recording import NODE, write_bag, write_mcap
 from care_samples.robot.starting import write_robot
 from care_samples.robot.world import Conditions
 
+pytestmark = pytest.mark.long
+
 DOCUMENT = ROOT / "docs" / "new-robot.md"
 VARIED = ("slow_distance", "max_speed", "patience", "controller_frequency")
 

@@ -18,6 +18,8 @@ from tests.contradictions import contradictions
 from tests.restamped import dataflash_with
 from tests.whole import one_in
 
+pytestmark = pytest.mark.long
+
 DATA = Path(__file__).parents[1] / "data"
 SAMPLES = (
     "arducopter_failed.BIN", "arducopter_motor.BIN", "ardurover_failed.BIN", "arduplane_elevator.BIN",

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from benchmarks.wild_logs import outcome_of, wild_files
 from care_core.errors import ExitCode
 from tests.conftest import Care
 from tests.whole import one_in
+
+pytestmark = pytest.mark.long
 
 WENT_WELL = {"px4_events.ulg"}
 """A simulated take-off, return and landing."""

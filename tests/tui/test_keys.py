@@ -22,6 +22,8 @@ from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, quiet, settle
 from tests.whole import one_in
 
+pytestmark = pytest.mark.long
+
 LEADS_OUT = {"q", "ctrl+c"}
 VIEWS = ("w", "m", "p", "y", "b", "v", "M", "L")
 STEPS = ("1", "2", "3", "4", "5", "6")
