@@ -55,6 +55,10 @@ REFUSING = Estimate(
     0.98, "an option that the refusing check reads kept the vehicle from arming",
     "20 of 20 refused missions of the development sets (Jeffreys: 0.976, 0.88 to 1.0)",
 )  # fmt: skip
+BY_CHANCE_REFUSED = Estimate(
+    0.002, "a vehicle is kept from arming by chance: a check that refuses reads something",
+    "only what the profile does not know stands beside it", is_by_hand=True,
+)  # fmt: skip
 SPOKEN_FOR = Estimate(
     0.05,
     "what options have to lose together for a finding about the settings that names none to speak for them",

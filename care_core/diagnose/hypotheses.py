@@ -22,6 +22,7 @@ from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import ReferenceRuns
 from care_core.diagnose.estimates import (
+    BY_CHANCE_REFUSED,
     DOUBT,
     LATE,
     LEARNED_WEIGHT,
@@ -95,7 +96,8 @@ def failure_of(
     names = [result.variable.name for result in broken]
     options, chance = _lost_by_options(before, names)
     if was_refused(findings):
-        options = dict.fromkeys(options, 0.0)  # what acts in flight kept no vehicle from arming
+        options = dict.fromkeys(options, 0.0)  # what acts in flight kept no vehicle from arming, and hardly chance
+        chance = min(chance, BY_CHANCE_REFUSED.value)
     else:
         unlearned = float(before.epistemic_ratio([before.config], names)[0])
         pointed = _pointed_at(found)

@@ -39,8 +39,9 @@ MOST_FINDINGS = 2
 """Findings that the sentence names."""
 AS_WELL = 0.1
 """Difference from which on it is told that a cause may have acted beside those above it."""
-LINE, LINES = 80, 2
-"""Columns, and lines of a headline: what was missed first and what ended the run; the rest stands below."""
+LINE, LINES, _BROKEN = 80, 2, 12
+"""Columns, and lines of a headline: what was missed first and what ended the run; the rest stands below. Lines end
+between words, so many columns early."""
 BUT = "but "
 """What the sentence of a run begins with that met its objectives while a part of it failed."""
 
@@ -257,7 +258,7 @@ def compose(
     the other missions of the log that failed."""
     status = status_of({one.status for one in objectives}, {one.severity for one in findings}, fit.verdict)
     return Verdict(
-        fit=clean(fit_line(profile, fit)),
+        fit=clean(fit_line(profile, fit, LINES)),
         status=status,
         failed=clean(_failed(status, fit.verdict, objectives, findings)),
         advice=advice,
@@ -375,15 +376,16 @@ def fit_words(profile: str, verdict: FitVerdict) -> str:
     return f"Profile {profile} {FIT_WORDS[verdict]}" if profile else "No profile fits"
 
 
-def fit_line(profile: str, fit: Fit) -> str:
-    """The same in one line: the first reason, and how many more stand below."""
+def fit_line(profile: str, fit: Fit, lines: int = 1) -> str:
+    """The same in so many lines at most: the first reason, and how many more stand below."""
     if not profile:
         return f"No profile fits this log: {NO_LIMITS}"
     if not fit.reasons:
         return fit_words(profile, fit.verdict)
     more = f" (and {len(fit.reasons) - 1} more)" if len(fit.reasons) > 1 else ""
+    width = LINE if lines == 1 else lines * LINE - _BROKEN
     text = f"{fit_words(profile, fit.verdict)}: {fit.reasons[0]}"
-    return f"{textwrap.shorten(text, LINE - len(more), placeholder=' ...')}{more}"
+    return f"{textwrap.shorten(text, width - len(more), placeholder=' ...')}{more}"
 
 
 def fit_text(profile: str, fit: Fit) -> str:

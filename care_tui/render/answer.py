@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
-from care_core.diagnose.verdict import hypothesis_text, verdict_of
+from care_core.diagnose.verdict import fit_line, hypothesis_text, verdict_of
 from care_core.ecosystems.findings import every_finding
 from care_core.text import clean
 from care_tui.render.health import warnings_of
@@ -124,7 +124,7 @@ def _limits(diagnosis: Diagnosis, *, is_low: bool) -> Iterator[Content]:
     found = warnings_of(diagnosis)
     if fit.verdict != "fits":
         style = "$text-warning" if fit.verdict == "partly" else "bold $text-error"
-        yield Content.styled(f"! {clean(verdict_of(diagnosis).fit)}", style)
+        yield Content.styled(f"! {clean(fit_line(diagnosis.profile.title, fit))}", style)
     if found and not (is_low and fit.verdict != "fits"):
         yield Content.styled("! " + clean("; ".join(found)), "$text-warning")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Sequence
 from html import unescape
 from xml.etree import ElementTree
@@ -20,6 +21,7 @@ from care_core.diagnose.verdict import (
     Verdict,
     compose,
     exit_code,
+    fit_line,
     verdict_of,
 )
 from care_core.ecosystems.findings import Finding
@@ -164,13 +166,14 @@ def test_one_reason_for_all_that_could_not_be_judged_is_the_first_line() -> None
         assert verdict_on(several).headline.startswith("NOT EVALUATED: no fault found, but ")
 
 
-def test_the_fit_comes_last_in_one_line_and_names_no_profile_that_does_not_matter() -> None:
+def test_the_fit_comes_last_in_two_lines_at_most_and_names_no_profile_that_does_not_matter() -> None:
     reasons = ("the log does not say what vehicle it is of, the profile is for a copter", "old firmware", "few topics")
     verdict = verdict_on([MET], fit=Fit("partly", reasons))
     assert verdict.lines[-1] == verdict.fit
-    assert len(verdict.fit) <= 80
-    assert verdict.fit.startswith("Profile copter partly fits: the log does not say")
+    assert len(textwrap.wrap(verdict.fit, 80)) <= 2
+    assert verdict.fit.startswith("Profile copter partly fits: the log does not say what vehicle")
     assert verdict.fit.endswith("(and 2 more)")
+    assert len(fit_line("copter", Fit("partly", reasons))) <= 80
     none = verdict_on([], fit=Fit("no", ("arducopter: it is for a copter, this is a plane",)), profile="").fit
     assert none == "No profile fits this log: no limits for time and energy, no causes by parameters"
 
