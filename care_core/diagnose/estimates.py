@@ -59,6 +59,10 @@ BY_CHANCE_REFUSED = Estimate(
     0.002, "a vehicle is kept from arming by chance: a check that refuses reads something",
     "only what the profile does not know stands beside it", is_by_hand=True,
 )  # fmt: skip
+REFUSED_ITSELF = Estimate(
+    0.5, "what a refusal says is the reason itself, where no parameter is likely to be: no position, sensors at odds",
+    "only what the profile does not know stands beside it", is_by_hand=True,
+)  # fmt: skip
 SPOKEN_FOR = Estimate(
     0.05,
     "what options have to lose together for a finding about the settings that names none to speak for them",

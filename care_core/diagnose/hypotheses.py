@@ -30,6 +30,7 @@ from care_core.diagnose.estimates import (
     MISSION_LOST_CRITICAL,
     MISSION_LOST_INFO,
     MISSION_LOST_WARNING,
+    REFUSED_ITSELF,
     REFUSING,
     SPOKEN_FOR,
     UNMODELLED,
@@ -234,12 +235,20 @@ def with_findings(causes: Mapping[Key, float], findings: Iterable[Finding]) -> d
         whole = finding.probability * mission_lost(finding)
         named: list[Key] = [("parameter", name) for name in finding.parameters]
         shares = dict.fromkeys(named, whole / max(1, len(named)))
+        if _is_the_reason_itself(finding, causes):
+            shares["world", finding.title] = REFUSED_ITSELF.value
         if finding.suspect in _WHAT:
             shares[_WHAT[finding.suspect], finding.title] = whole * (
                 LATE.value if is_late(finding, by_setting) else 1.0
             )
         found |= {key: max(found.get(key, 0.0), share) for key, share in shares.items()}
     return found
+
+
+def _is_the_reason_itself(finding: Finding, causes: Mapping[Key, float]) -> bool:
+    """Whether it is a refusal to arm of which no parameter is likely to be the reason: what it says is."""
+    likely = any(what == "parameter" and share > SPOKEN_FOR.value for (what, _), share in causes.items())
+    return finding.kind == "prearm" and finding.suspect == "parameter" and not finding.parameters and not likely
 
 
 def mission_lost(finding: Finding) -> float:
