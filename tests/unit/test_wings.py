@@ -208,3 +208,17 @@ def hovering(rate_hz: float) -> MadePlane:
     for n in range(5, 9):
         flown.table["RCOU"][f"C{n}"] = np.where(hovers, 1550 + flown.noise(5.0), 1000.0)
     return flown
+
+
+@pytest.mark.parametrize(
+    ("trim", "bank", "told"), [(1800.0, -20.0, True), (1800.0, 0.0, False), (1500.0, -20.0, False)]
+)
+def test_a_rudder_that_its_trim_holds_over_is_shown_by_the_bank(trim: float, bank: float, told: bool) -> None:
+    flown = MadePlane()
+    flown.settings |= {"SERVO4_FUNCTION": 21, "SERVO4_TRIM": trim}
+    flown.table["RCOU"]["C4"] = np.full_like(flown.t, trim)
+    straight = (flown.t > 14) & ((flown.t < 25) | (flown.t > 80))
+    flown.table["ATT"]["Roll"] = flown.table["ATT"]["Roll"] + bank * straight
+    title = "it flies straight with a bank: the rudder is held over"
+    named = [one.parameters for one in flown.find() if one.title == title]
+    assert named == ([("SERVO4_TRIM",)] if told else [])

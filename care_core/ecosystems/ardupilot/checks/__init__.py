@@ -42,7 +42,15 @@ from care_core.ecosystems.ardupilot.checks.settings import (
     supply,
     thrust_curve,
 )
-from care_core.ecosystems.ardupilot.checks.wings import airspeed, lift, propeller, surfaces, time_to_climb, transition
+from care_core.ecosystems.ardupilot.checks.wings import (
+    airspeed,
+    lift,
+    propeller,
+    rudder,
+    surfaces,
+    time_to_climb,
+    transition,
+)
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -59,6 +67,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     lift.CHECK,
     propeller.CHECK,
     surfaces.CHECK,
+    rudder.CHECK,
     transition.CHECK,
     time_to_climb.CHECK,
     attitude.CHECK,
