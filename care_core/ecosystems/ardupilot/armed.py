@@ -222,7 +222,8 @@ class Armed(Recorded):
         before = table[column][table.t <= start + 1.0]
         zero = float(median(before[-20:])) if len(before) else float(table[column][0])
         after = table[column][(table.t > start) & (table.t <= start + _SPOOLS_S)]
-        if column == "RelHomeAlt" and len(after) and abs(float(after[-1]) - zero) > _NO_CLIMB_M:
+        is_reset = column == "RelHomeAlt" and len(before) > 1 and start > float(table.t[0]) + _SPOOLS_S
+        if is_reset and len(after) and abs(float(after[-1]) - zero) > _NO_CLIMB_M:
             zero = float(after[-1])  # home was set to where it is as it was armed
         return table.t, table[column] - (zero if abs(zero) < _NEAR_HOME_M or column != "RelHomeAlt" else 0.0)
 
