@@ -39,7 +39,7 @@ from care_core.diagnose.estimates import (
     USED_UP,
 )
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, Key, NoisyOr, What
-from care_core.diagnose.parts import is_late, set_wrong, was_refused
+from care_core.diagnose.parts import OUTLASTED, is_late, set_wrong, was_refused
 from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.explains import EXPLAINS
@@ -59,7 +59,6 @@ LEAST = 0.005
 UNNAMED = "chance, or what no log shows"
 """What chance is called where there is no reference configuration that could fail as well."""
 NONE_OUTSIDE: Mapping[str, float] = MappingProxyType({})
-OUTLASTED = "the flight outlasted its battery"
 _WHAT: Mapping[SuspectKind, What] = {"hardware": "hardware", "world": "world", "operation": "world"}
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from care_core.diagnose.hypotheses import OUTLASTED
-from care_core.diagnose.parts import is_pack, mend_first
+from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS

@@ -12,6 +12,8 @@ from care_core.ecosystems.findings import CAME_DOWN, NO_BATTERY, OWN_SUPPLY, UNC
 from care_core.ecosystems.ranking import LIKELY
 from care_core.text import log_time
 
+OUTLASTED = "the flight outlasted its battery"
+"""What explains a failsafe of the battery that is all that went wrong."""
 LATE_S = 5.0
 """Seconds after a sign of how the robot was set from which what fails may be of that."""
 SENSED = frozenset(("barometer", "compass", "gps", "vibration"))

@@ -992,3 +992,12 @@ def test_a_blow_that_stops_it_is_no_vibration() -> None:
     found = [one for finding in made.find() for one in (finding, *finding.below)]
     assert "vibration" not in [one.kind for one in found]
     assert made.flight().struck_s == pytest.approx(50.0, abs=0.2)
+
+
+def test_home_that_is_set_as_it_is_armed_is_no_climb() -> None:
+    made = Made()
+    lift = np.where(made.t < ARMED_S + 0.3, -3.5, 0.0)
+    made.table["POS"]["RelHomeAlt"] = made.table["POS"]["RelHomeAlt"] + lift
+    t, height = made.flight().estimated_height or (np.empty(0), np.empty(0))
+    assert float(np.max(height[t < ARMED_S + 2])) < 1.0
+    assert float(np.max(height)) == pytest.approx(12.0, abs=1.0)

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.diagnose.estimates import UNMODELLED
-from care_core.diagnose.hypotheses import OUTLASTED, UNTOLD_BY_FIT, hypotheses_of, unasked, with_findings
+from care_core.diagnose.hypotheses import UNTOLD_BY_FIT, hypotheses_of, unasked, with_findings
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, NoisyOr
+from care_core.diagnose.parts import OUTLASTED
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.records import replace

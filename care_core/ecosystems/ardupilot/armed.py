@@ -32,7 +32,7 @@ _OPENED_S, _CLOSED_S = 0.5, 2.0
 _FEWEST, _TIMES = 10, 10.0
 """A pause is a closed logger where it is so many times what usually lies between two records."""
 _SPOOLS_S, _NO_CLIMB_M = 1.5, 1.0
-"""No copter climbs so far so shortly after it was armed: its motors still spool up."""
+"""No copter climbs so far from one record to the next so shortly after it was armed: its motors still spool up."""
 _NEAR_HOME_M = 50.0
 _ALIVE_M, _ON_GROUND_M, _APART_M = 0.05, 1.2, 3.0
 """A barometer that moves by more lives, and by less than the second on the ground, propellers and all."""
@@ -221,10 +221,8 @@ class Armed(Recorded):
         start = self.armed[0][0] if self.armed else 0.0
         before = table[column][table.t <= start + 1.0]
         zero = float(median(before[-20:])) if len(before) else float(table[column][0])
-        after = table[column][(table.t > start) & (table.t <= start + _SPOOLS_S)]
-        is_reset = column == "RelHomeAlt" and len(before) > 1 and start > float(table.t[0]) + _SPOOLS_S
-        if is_reset and len(after) and abs(float(after[-1]) - zero) > _NO_CLIMB_M:
-            zero = float(after[-1])  # home was set to where it is as it was armed
+        if column == "RelHomeAlt":
+            zero += _step_at(table.t, table[column], start)  # home was set to where it is as it was armed
         return table.t, table[column] - (zero if abs(zero) < _NEAR_HOME_M or column != "RelHomeAlt" else 0.0)
 
     @cached_property
@@ -248,3 +246,12 @@ def _arm_change(table: Table, row: int) -> ArmChange:
     how = method_words(int(table["Method"][row])) if "Method" in table.columns else ""
     is_forced = bool(table["Forced"][row] == 1) if "Forced" in table.columns else None
     return ArmChange(float(table.t[row]), bool(table["ArmState"][row] > 0), how, is_forced)
+
+
+def _step_at(t: Floats, height: Floats, armed_s: float) -> float:
+    """By how much a height leaps from one record to the next as a vehicle is armed; 0 where it does not, or where the
+    log begins then."""
+    near = np.flatnonzero((t > max(armed_s - 1.0, float(t[0]) + _SPOOLS_S)) & (t <= armed_s + _SPOOLS_S))
+    steps = height[near] - height[near - 1] if len(near) else np.zeros(1)
+    most = float(steps[np.argmax(np.abs(steps))])
+    return most if abs(most) > _NO_CLIMB_M else 0.0
