@@ -85,7 +85,7 @@ class CareApp(App[int], inherit_bindings=False):
         self.code = ExitCode.INTERRUPTED if request else ExitCode.OK
         glyphs = ASCII if settings.ascii else UNICODE
         folder = None if request is None or not is_folder_of_logs(request.log) else request.log.absolute()
-        self.workspace = Workspace(engine or Engine(), settings, glyphs, request, folder=folder)
+        self.workspace = Workspace(engine or Engine(), settings, glyphs, request, request, folder=folder)
         self._case = CaseScreen(self.workspace)
         self._held = ExitStack()
         """Updates that are held back while the last frame is under way to the terminal."""

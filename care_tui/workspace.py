@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from care_core.application.case import Request
-from care_core.records import Struct, field
-from care_tui.engine import Engine
+from care_core.records import Struct, field, replace
+from care_tui.engine import CAUSES, Engine
 from care_tui.render.rows import Glyphs
 from care_tui.session import Session
 from care_tui.settings import Settings
@@ -18,14 +18,38 @@ class Workspace(Struct, eq=False):
     engine: Engine
     settings: Settings
     glyphs: Glyphs
+    given: Request | None = None
+    """What was asked for when the app was called."""
     request: Request | None = None
+    """What the log that is open is judged by."""
     session: Session = field(default_factory=Session)
     written: list[Path] = field(default_factory=list)
     """Files that were written, for the terminal to name when the app is left."""
     folder: Path | None = None
     """The folder of logs that was named instead of one."""
 
+    def request_for(self, path: Path) -> Request:
+        """How a log is judged: as it was asked for on this log before, or on its folder. The options that were given
+        for another log are that one's, but for the limits of the site."""
+        for asked in (self.request, self.given):
+            if asked is not None and asked.log.absolute() == path.absolute():
+                return asked
+        if self.given is not None and self.folder is not None and path.absolute().is_relative_to(self.folder):
+            return replace(self.given, log=path)
+        return Request(path, top=CAUSES, site=self.given.site if self.given else None)
+
     @property
     def places(self) -> tuple[Path, ...]:
         """Where logs are looked for."""
         return self.settings.places if self.folder is None else (self.folder,)
+
+
+def left_out(before: Request, now: Request) -> list[str]:
+    """The options by which one log is judged and another is not."""
+    options = ("profile", "config", "keep", "threshold", "since", "reference")
+    fields = ("profile", "configs", "keep", "thresholds", "since", "reference")
+    return [
+        f"--{option}"
+        for option, name in zip(options, fields, strict=True)
+        if getattr(before, name) and getattr(before, name) != getattr(now, name)
+    ]

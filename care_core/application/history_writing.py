@@ -36,7 +36,8 @@ def remember_triage(diagnosis: Diagnosis, request: Request | None = None) -> Car
     from care_core.report.writers import published
 
     document, about = published(build_document(diagnosis)), about_run(diagnosis.run)
-    about = replace(about, terms="" if request is None else terms_of(request))
+    if request is not None:
+        about = replace(about, terms=terms_of(request), judged_with=options_of(request))
     return remember(lambda history: history.add_triage(document, diagnosis.run.mission.index, about))
 
 
@@ -55,6 +56,15 @@ def terms_of(request: Request) -> str:
         request.repeats, request.since, request.reference, site,
     )  # fmt: skip
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:16] if any(asked) else ""
+
+
+def options_of(request: Request) -> str:
+    """The options that give a log other limits or another reference than its own, as they are typed: with them, its
+    verdict is not the one that it has by itself. Empty where there are none."""
+    files = (("--since", request.since), ("--reference", request.reference), ("--site", request.site))
+    given = [f"{option} {file.name}" for option, file in files if file is not None]
+    given += [f"--threshold {name}={bound:g}" for name, bound in request.thresholds.items()]
+    return ", ".join(given)
 
 
 def about_run(run: Run) -> About:

@@ -95,6 +95,8 @@ class Past(Record):
     fit: FitVerdict
     verdict: str
     cause: str
+    judged_with: str
+    """The options that gave it other limits or another reference than its own."""
     values: Mapping[str, float | None]
     config: Mapping[str, float]
 
@@ -104,9 +106,20 @@ def past_runs() -> list[Past]:
     return [_past(triaged) for triaged in _remembered()]
 
 
-def known_verdicts(written_s: Mapping[Path, float]) -> dict[Path, tuple[RunStatus, str]]:
-    """What the local history knows of logs: the verdict on each that was triaged since it was last written, and what
-    failed. Empty where there is no history to be used."""
+class KnownVerdict(Record):
+    """The verdict on a log that is remembered, and what failed."""
+
+    status: RunStatus
+    failed: str
+    judged_with: str
+    """The options that gave it other limits or another reference than its own."""
+    terms: str
+    """What it was judged by, as the digest of `terms_of`."""
+
+
+def known_verdicts(written_s: Mapping[Path, float]) -> dict[Path, KnownVerdict]:
+    """What the local history knows of logs, of each that was triaged since it was last written. Empty where there is no
+    history to be used."""
     from datetime import datetime
 
     from care_core.report.document import remembered_verdict
@@ -116,7 +129,7 @@ def known_verdicts(written_s: Mapping[Path, float]) -> dict[Path, tuple[RunStatu
         triages = _remembered()
     except CareError:
         return {}
-    known: dict[Path, tuple[RunStatus, str]] = {}
+    known: dict[Path, KnownVerdict] = {}
     for triaged in triages:  # the newest first
         path = Path(triaged.log_path)
         if (
@@ -125,7 +138,7 @@ def known_verdicts(written_s: Mapping[Path, float]) -> dict[Path, tuple[RunStatu
             and datetime.fromisoformat(triaged.at).timestamp() >= written_s[path]
         ):
             verdict = remembered_verdict(remembered(triaged.document))
-            known[path] = verdict.status, verdict.failed
+            known[path] = KnownVerdict(verdict.status, verdict.failed, triaged.judged_with, triaged.terms)
     return known
 
 
@@ -152,6 +165,7 @@ def _past(triaged: Triaged) -> Past:
         fit=document.fit.verdict,
         verdict=remembered_verdict(document).headline,
         cause=leading_cause(document),
+        judged_with=triaged.judged_with,
         values={entry.name: entry.value for entry in document.objectives},
         config=document.config,
     )

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from care_core.application.case import Request, open_case
-from care_core.application.history_writing import about_run, terms_of
+from care_core.application.history_writing import about_run, options_of, terms_of
 from care_core.diagnose.verdict import exit_code
 from care_core.errors import CareError, ExitCode
 from care_core.history.store import About, History, HistoryError
@@ -203,8 +203,10 @@ def triage_one(path: Path, *, task: Task) -> Triage:
     from care_core.report.document import build_document
     from care_core.report.writers import published
 
-    diagnosis = open_case(_request(path, task), lambda _step, _share: None).diagnosis
-    return published(build_document(diagnosis)), diagnosis.run.mission.index, about_run(diagnosis.run)
+    request = _request(path, task)
+    diagnosis = open_case(request, lambda _step, _share: None).diagnosis
+    about = replace(about_run(diagnosis.run), judged_with=options_of(request))
+    return published(build_document(diagnosis)), diagnosis.run.mission.index, about
 
 
 def _request(path: Path, task: Task) -> Request:

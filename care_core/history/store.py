@@ -83,6 +83,8 @@ class About(Record):
     """What it was judged by where that was not the profile alone, as a digest."""
     individual: Mapping[str, float | str] = field(default_factory=dict)
     """The parameters that tell this vehicle from others of its kind."""
+    judged_with: str = ""
+    """Options that gave it other limits or another reference than its own, as they were typed."""
 
 
 class Triaged(Record):
@@ -101,8 +103,12 @@ class Triaged(Record):
     """All parameters that somebody sets, as driven; empty where the log holds none."""
     recording: str = ""
     """What copies of its log share; empty where that is not known."""
+    terms: str = ""
+    """What it was judged by where that was not the profile alone, as a digest."""
     individual: Mapping[str, float | str] = field(default_factory=dict)
     """The parameters that tell this vehicle from others of its kind; empty where the log holds none."""
+    judged_with: str = ""
+    """Options that gave it other limits or another reference than its own, as they were typed."""
 
 
 class Verified(Record):
@@ -245,7 +251,7 @@ class History(Record):
             read(_Searched, {name: document.get(name) for name in _Searched.__struct_fields__})
         except (UnfitError, OverflowError) as err:
             raise self._unusable("a record in it is damaged") from err
-        told = (getattr(known, name) for name in About.__struct_fields__ if name != "terms")
+        told = (getattr(known, name) for name in About.__struct_fields__)
         return self._checked(Triaged, at, path, mission, document, *told)
 
     def _verified(self, at: str, name: str, version: str, p: float, worked: int | None, text: str) -> Verified:
@@ -399,7 +405,7 @@ def insert_triage(connection: sqlite3.Connection, document: Mapping[str, Any], m
     robot = None if about.robot is None else plain(about.robot)
     told = {
         "robot": robot, "asked": about.asked, "firmware": about.firmware, "recording": about.recording,
-        "terms": about.terms, "individual": about.individual,
+        "terms": about.terms, "individual": about.individual, "judged_with": about.judged_with,
     }  # fmt: skip
     settings = zlib.compress(json.dumps(about.settings).encode()) if about.settings else None
     connection.execute(

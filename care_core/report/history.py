@@ -27,7 +27,8 @@ _CHANGES = 4
 
 class PastTriage(Document, kw_only=True):
     """`profile` is empty where none fitted, `fit` says how well it did; `verdict` says in words how the run went;
-    `options` are those that the suggested fix changes, none without a fix."""
+    `options` are those that the suggested fix changes, none without a fix; `judged_with` are the options of the command
+    that gave it other limits or another reference than its own, empty without any."""
 
     at: str
     log: str
@@ -41,6 +42,7 @@ class PastTriage(Document, kw_only=True):
     p_fixed: float | None
     odds_as_driven: float | None = None
     """Probability that the next run meets all objectives as driven."""
+    judged_with: str = ""
 
 
 class PromiseRecord(Document, kw_only=True):
@@ -148,6 +150,7 @@ def _past(triaged: Triaged) -> PastTriage:
         options=[change.option for change in fix.changes] if fix else [],
         p_fixed=fix.odds if fix else None,
         odds_as_driven=document.odds_as_driven,
+        judged_with=clean(triaged.judged_with),
     )
 
 
@@ -207,7 +210,9 @@ def _lines(document: HistoryDocument, ascii: bool, everything: bool) -> Iterator
         odds = "odds not measured" if past.p_fixed is None else f"{percent(past.p_fixed)}{beside(past.odds_as_driven)}"
         fix = f"  change {', '.join(past.options)} ({odds})" if past.options else ""
         fit = fit_words(past.profile, past.fit).removeprefix("Profile ")
-        yield from wrapped(f"{when}  {Path(past.log).name}  {fit}  {past.verdict}{fix}", rest=" " * (len(when) + 2))
+        own = f"  (judged with {past.judged_with})" if past.judged_with else ""
+        line = f"{when}  {Path(past.log).name}  {fit}  {past.verdict}{own}{fix}"
+        yield from wrapped(line, rest=" " * (len(when) + 2))
     told = [robot for robot in document.robots if everything or not _is_thin(_all_trends(robot))]
     for robot in told:
         yield ""

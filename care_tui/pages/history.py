@@ -80,6 +80,7 @@ class HistoryPage(Page):
         mark = "*" if past == self._marked else " "
         line = Content(f"{mark} {past.at[:16].replace('T', ' ')}  ")
         fit = "" if past.fit == "fits" else f"  ({fit_words(past.profile, past.fit).removeprefix('Profile ')})"
+        fit += f"  (with {past.judged_with})" if past.judged_with else ""
         return line + padded(_named(past), 26, "bold") + text(f" {past.verdict}") + text(fit, "dim")
 
     def _detail(self, index: int, runs: list[Past]) -> list[Row]:
@@ -91,6 +92,8 @@ class HistoryPage(Page):
             labelled("Fit", fit_words(past.profile, past.fit)),
             labelled("Verdict", past.verdict),
         ]
+        if past.judged_with:
+            rows.append(labelled("Judged", f"with {past.judged_with}, not by its own limits"))
         if past.cause:
             rows.append(labelled("Cause", past.cause))
         until = [run for run in reversed(runs[index:]) if run.profile == past.profile]

@@ -15,10 +15,11 @@ from textual.message import Message
 from textual.worker import Worker, get_current_worker
 
 from care_core.application.case import Request
+from care_core.application.history_writing import options_of, terms_of
 from care_core.application.viewing import known_verdicts
 from care_core.diagnose.verdict import RunStatus, verdict_of
 from care_core.errors import CareError
-from care_core.records import Record, replace
+from care_core.records import Record
 from care_core.text import clean
 from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Judge, OpenLog
@@ -43,6 +44,8 @@ class Known(Record):
 
     status: RunStatus
     words: str
+    judged_with: str = ""
+    """The options that gave it other limits or another reference than its own."""
 
 
 class LogsPage(Page):
@@ -94,14 +97,18 @@ class LogsPage(Page):
         """Tell the verdicts that are remembered; of a folder that was named the others are found out, too."""
         worker = get_current_worker()
         remembered = known_verdicts({log.path: log.modified_s for log in logs})
-        for path, (verdict, words) in remembered.items():
-            self.post_message(self.Verdict(path, Known(verdict, words)))
-        if self.workspace.folder is None or self.workspace.request is None:
-            return
-        for log in logs:
+        if self.workspace.folder is not None:  # by other options it may be another verdict
+            remembered = {
+                path: past
+                for path, past in remembered.items()
+                if past.terms == terms_of(self.workspace.request_for(path))
+            }
+        for path, past in remembered.items():
+            self.post_message(self.Verdict(path, Known(past.status, past.failed, past.judged_with)))
+        for log in logs if self.workspace.folder is not None else ():
             if log.path in remembered:
                 continue
-            known = self._verdict(replace(self.workspace.request, log=log.path), worker)
+            known = self._verdict(self.workspace.request_for(log.path), worker)
             if known is None:
                 return
             self.post_message(self.Verdict(log.path, known))
@@ -122,7 +129,7 @@ class LogsPage(Page):
         except Exception as err:
             return Known("unreadable", as_care_error(err).message)
         verdict = verdict_of(case.diagnosis)
-        return Known(verdict.status, verdict.failed)
+        return Known(verdict.status, verdict.failed, options_of(request))
 
     @on(Verdict)
     def _tell(self, event: Verdict) -> None:
@@ -131,9 +138,9 @@ class LogsPage(Page):
         if self.display:
             self.show()
 
-    def learned(self, path: Path, verdict: RunStatus, words: str) -> None:
+    def learned(self, path: Path, known: Known) -> None:
         """A log was opened, so its verdict is known."""
-        self._known[path.absolute()] = Known(verdict, words)
+        self._known[path.absolute()] = known
 
     def view(self) -> View:
         logs, now = self._logs, time.time()
@@ -177,7 +184,10 @@ class LogsPage(Page):
         mark = self.glyphs.here if log.path == self.session.path else " "
         known = self._known.get(log.path)
         verdict = Content("") if known is None else _status(known.status, self)
-        is_told = known is not None and bool(known.words) and width < ROOMY
+        words = "" if known is None else known.words
+        if known is not None and known.judged_with:
+            words = f"(with {known.judged_with}) {words}"
+        is_told = bool(words) and width < ROOMY
         about = " " if is_told else f" {age(now - log.modified_s):>10}  {size(log.size):>8}  "
         named = self._named(log.path)
         line = Content.assemble(
@@ -186,8 +196,8 @@ class LogsPage(Page):
             named.pad_right(self._name_width - named.cell_length),
             about,
         )
-        if known is not None and known.words:
-            return line + text(known.words, "dim")
+        if words:
+            return line + text(words, "dim")
         # Of a long path the end tells more than the beginning.
         folder, room = clean(short(log.path.parent)), width - line.cell_length
         if len(folder) > room:
@@ -209,6 +219,8 @@ class LogsPage(Page):
         known = self._known.get(log.path)
         if known is not None:
             yield labelled("Verdict", Content.assemble(_status(known.status, self), "  ", text(known.words)))
+            if known.judged_with:
+                yield labelled("Judged", f"with {known.judged_with}, not by its own limits")
         yield labelled("Log", str(log.path))
         yield labelled("Written", time.strftime("%Y-%m-%d %H:%M", time.localtime(log.modified_s)))
         yield labelled("Size", size(log.size) + (", opened before" if log.is_recent else ""))

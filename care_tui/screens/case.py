@@ -19,17 +19,18 @@ from textual.widgets import ContentSwitcher, Static
 from textual.worker import get_current_worker
 
 from care_core.application.case import Case, Request
+from care_core.application.history_writing import options_of
 from care_core.application.proof import Subject
 from care_core.diagnose.records import Fix
 from care_core.diagnose.verdict import verdict_of
 from care_core.ecosystems.findings import Health
 from care_core.errors import CareError
-from care_core.records import Record, replace
+from care_core.records import Record
 from care_core.text import clean
-from care_tui.engine import CAUSES, CancelledError, as_care_error
+from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Answered, Decided, Go, Judge, OpenLog, Progressed
 from care_tui.page_names import LOGS, NAMES, PAGES, STEPS, VIEWS
-from care_tui.pages.logs import LogsPage
+from care_tui.pages.logs import Known, LogsPage
 from care_tui.pages.making import make_page
 from care_tui.pages.page import Page
 from care_tui.places import remember
@@ -38,7 +39,7 @@ from care_tui.widgets.answer_bar import AnswerBar
 from care_tui.widgets.filter_bar import FilterBar
 from care_tui.widgets.keys import Keys
 from care_tui.widgets.tab_row import TabRow
-from care_tui.workspace import Workspace
+from care_tui.workspace import Workspace, left_out
 
 if TYPE_CHECKING:
     from care_tui.app import CareApp
@@ -278,15 +279,11 @@ class CaseScreen(Screen[None]):
         await self.open_log(event.path)
 
     async def open_log(self, path: Path) -> None:
-        """Diagnose a log, asked for as the one before; what was chosen for that one is gone."""
-        asked = self.workspace.request
-        # A mission belongs to the log that it was named for.
-        is_other = asked is not None and asked.log.absolute() != path.absolute()
-        request = (
-            Request(path, top=CAUSES)
-            if asked is None
-            else replace(asked, log=path, mission=None if is_other else asked.mission)
-        )
+        """Diagnose a log by what belongs to it; what was chosen for the one before is gone."""
+        before, request = self.workspace.request, self.workspace.request_for(path)
+        if before is not None and (left_behind := " and ".join(left_out(before, request))):
+            told = f"Judged by itself: {left_behind} stayed with {before.log.name}."
+            self.app.notify(clean(told), markup=False)
         await self._read(request)
 
     @on(Judge)
@@ -364,7 +361,9 @@ class CaseScreen(Screen[None]):
         diagnosis = answer.diagnosis
         verdict = verdict_of(diagnosis)
         for logs in self.query(LogsPage):
-            logs.learned(answer.log.path if answer.log else self.session.path or Path(), verdict.status, verdict.failed)
+            path = answer.log.path if answer.log else self.session.path or Path()
+            with_options = options_of(self.workspace.request) if self.workspace.request else ""
+            logs.learned(path, Known(verdict.status, verdict.failed, with_options))
         self.call_after_refresh(self._prepare)
         # What happened is the answer where no profile fits, or a part of it that comes first where one failed.
         stays = diagnosis.profile.fit.verdict == "no" or _has_failed_part(diagnosis.health)

@@ -13,11 +13,15 @@ from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError
 from care_core.history.store import History
 from care_core.records import replace
+from care_core.report.history import history_document, history_text
 from care_tui.app import CareApp
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, fake_engine, settle
 from tests.tui.test_walk import items, text, title
+
+
+ROOT = Path(__file__).parents[2]
 
 
 def run_of(number: int, mission_time: float, land_speed: float) -> Diagnosis:
@@ -133,3 +137,53 @@ async def test_enter_opens_the_log_of_a_past_run() -> None:
         await settle(pilot, "y", "j", "enter")
         assert asked == [LOG, Path("/flights/00000001.BIN")]
         assert "mission_time" in items(app), "the objectives of that log are shown"
+
+
+def asking_app(request: Request) -> tuple[CareApp, list[Request]]:
+    """An app that remembers what it judges, and what was asked of it."""
+    asked: list[Request] = []
+
+    def diagnose(request: Request, _progress: object) -> Case:
+        asked.append(request)
+        return Case(run_of(int(request.log.stem), 187.0, 16.0))
+
+    engine = replace(fake_engine(diagnose), remember=remember_triage)
+    return CareApp(request, engine=engine, settings=Settings(places=())), asked
+
+
+async def test_options_belong_to_the_log_that_they_were_given_for(tmp_path: Path) -> None:
+    assert remember_triage(run_of(1, 140.0, 50.0)) is None
+    site, good = tmp_path / "site.yaml", Path("/flights/good.BIN")
+    site.write_text("limits: {}\n")
+    given = Request(LOG, keep=("LAND_SPEED",), thresholds={"mission_time": 20.0}, since=good, site=site, top=10)
+    app, asked = asking_app(given)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "y", "j", "enter")
+        assert asked[-1] == Request(Path("/flights/00000001.BIN"), site=site, top=10)
+        assert "--threshold and --since stayed with 00000042.BIN" in app.title
+        await settle(pilot, "y", *"/0042", "enter", "enter")
+        assert asked[-1] == given, "back at the log that they were given for they hold"
+
+
+async def test_a_verdict_by_limits_of_ones_own_is_marked_in_history_and_logs() -> None:
+    with_limit = Request(LOG, thresholds={"mission_time": 20.0})
+    app, _ = asking_app(with_limit)
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot, "y")
+        assert "(with --threshold mission_time=20)" in items(app)
+        assert "not by its own limits" in text(app)
+    (remembered,) = store().triages()
+    assert remembered.judged_with == "--threshold mission_time=20"
+    assert "(judged with --threshold mission_time=20)" in history_text(history_document(store().triages(), ()))
+
+
+async def test_a_verdict_by_other_options_is_not_that_of_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "00000042.BIN").write_bytes((ROOT / "samples" / "arducopter_failed.BIN").read_bytes())
+    app, asked = asking_app(Request(tmp_path, thresholds={"mission_time": 20.0}, top=10))
+    log = replace(run_of(42, 187.0, 16.0).run.log, path=str(tmp_path / "00000042.BIN"))
+    plain = run_of(42, 187.0, 16.0)
+    assert remember_triage(replace(plain, run=replace(plain.run, log=log))) is None
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot)
+        assert [request.thresholds for request in asked] == [{"mission_time": 20.0}]
+        assert "(with --threshold mission_time=20)" in items(app)
