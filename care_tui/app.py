@@ -29,7 +29,7 @@ from care_tui.engine import Engine
 from care_tui.hangup import on_hangup
 from care_tui.link import Link, linked
 from care_tui.page_names import LOGS, STEPS, VIEWS
-from care_tui.pages.page import OPEN
+from care_tui.pages.page import OPEN, label_of
 from care_tui.places import as_path, is_openable
 from care_tui.render.rows import ASCII, UNICODE
 from care_tui.screens.case import CaseScreen
@@ -229,9 +229,7 @@ class CareApp(App[int], inherit_bindings=False):
         for key, active in sorted(screen.active_bindings.items(), key=lambda item: order(item[1])):
             binding = active.binding
             if active.enabled and binding.description and binding.id:
-                keys.setdefault((binding.description, binding.id), []).append(
-                    self.get_key_display(binding.with_key(key))
-                )
+                keys.setdefault((label_of(active), binding.id), []).append(self.get_key_display(binding.with_key(key)))
         return [(" ".join(shown), description, id) for (description, id), shown in keys.items()]
 
     def get_key_display(self, binding: Binding) -> str:
@@ -247,13 +245,14 @@ class CareApp(App[int], inherit_bindings=False):
             for page in (*STEPS, *VIEWS, LOGS):
                 about = f"{page.about} ({keys.get(page.binding, page.key)})"
                 yield SystemCommand(page.title, about, partial(screen.run_action, f"screen.go('{page.name}')"))
-            own = {one.binding.id: one.binding for one in screen.active_bindings.values() if one.node is screen.page}
-            for id, binding in own.items():
+            own = {one.binding.id: one for one in screen.active_bindings.values() if one.node is screen.page}
+            for id, active in own.items():
                 if id in keys and id != OPEN:
+                    binding = active.binding
                     action = binding.action.partition("(")[0]
                     about = (getattr(screen.page, f"action_{action}").__doc__ or "").strip().rstrip(".")
                     about = f"{about} ({keys[id]})"
-                    yield SystemCommand(binding.description, about, partial(screen.page.run_action, binding.action))
+                    yield SystemCommand(label_of(active), about, partial(screen.page.run_action, binding.action))
         yield SystemCommand("Help", "The keys that work here", self.action_help)
         yield SystemCommand("Theme", "Change the colours", self.action_change_theme)
         yield SystemCommand("Quit", "Leave care", self.action_quit)

@@ -32,11 +32,13 @@ def open_and_warm(request: Request, progress: Progress) -> Case:
     return case
 
 
-def comparison_of(a: Request, b: Request, progress: Progress) -> str:
-    """Two logs side by side, A the one to compare with, in lines for a terminal. Raises CareError."""
+def comparison_of(a: Request, b: Request, progress: Progress) -> Callable[[int], str]:
+    """Two logs side by side, A the one to compare with, in lines of whatever width is asked for. Raises CareError."""
     from care_core.application.comparing import compare
+    from care_core.report.comparison import comparison_text
 
-    return compare(a, b, progress).report()
+    document = compare(a, b, progress).document()
+    return lambda width: comparison_text(document, width)
 
 
 def save_text(path: Path, text: str) -> None:
@@ -56,7 +58,7 @@ class Engine(Record):
     commands: Callable[[Diagnosis], list[str]] = commands_of
     save: Callable[[Path, str], None] = save_text
     remember: Callable[[Diagnosis, Request], CareError | None] = remember_triage
-    compare: Callable[[Request, Request, Progress], str] = comparison_of
+    compare: Callable[[Request, Request, Progress], Callable[[int], str]] = comparison_of
     apply: Callable[[Case, Fix], list[tuple[Path, Path]]] = apply_to_files
     doubts: Callable[[Case, Fix], tuple[str, ...]] = doubts_of
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from care_core.diagnose.comparison import Comparison, Departure
+    from care_core.report.comparison import CompareDocument
 
 FORMATS = {"text": (), "json": (".json",), "markdown": (".md",), "html": (".html", ".htm")}
 """Formats of a comparison, and the endings of files that hold them."""
@@ -135,16 +136,22 @@ class Compared(Record, eq=False):
                 found.append(Departure(name, *at, meaning.unit))
         return sorted(found, key=lambda one: one.time_s)[:MOST_DEPARTURES]
 
+    def document(self) -> CompareDocument:
+        """Both runs as `care.compare/1`."""
+        from care_core.report.comparison import compare_document
+
+        return compare_document(self.comparison())
+
     def report(self, format: str = "text", sharing: Sharing | None = None) -> str:
         """Both runs in a format: text, json, markdown or html; `sharing` is what of them goes into it, by default no
         positions into the last two, which are made to be sent. Raises UsageError where there is no such format."""
-        from care_core.report.comparison import WRITERS, compare_document
+        from care_core.report.comparison import WRITERS
 
         if format not in FORMATS:
             hint = nearest(format, FORMATS) or f"There are {', '.join(FORMATS)}."
             raise UsageError(f"A comparison has no format '{format}'.", hint=hint)
         shared = replace(self, sharing=sharing or Sharing(positions=format not in _SENT))
-        document = compare_document(shared.comparison())
+        document = shared.document()
         if format in WRITERS:
             return WRITERS[format](document)
         from care_core.report.html import comparison_html

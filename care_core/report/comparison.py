@@ -17,7 +17,7 @@ from care_core.report.markdown import escaped
 from care_core.report.published import Document, publish, publishable
 from care_core.report.wording import SEVERITY_WORDS
 from care_core.run import shown
-from care_core.text import clean, figures, log_time, wrapped
+from care_core.text import WIDTH, clean, figures, log_time, wrapped
 
 SCHEMA_ID: Final = "care.compare/1"
 PARAMETERS_SHOWN, MEASURES_SHOWN, EVENTS_SHOWN, FINDINGS_SHOWN = 20, 12, 24, 12
@@ -260,11 +260,11 @@ def head_of(document: CompareDocument) -> Iterator[tuple[str, str]]:
         yield "Note", warning
 
 
-def comparison_text(document: CompareDocument) -> str:
-    """Lines of at most 80 columns."""
-    lines = [line for word, text in head_of(document) for line in wrapped(text, f"{word:<7}")]
+def comparison_text(document: CompareDocument, width: int = WIDTH) -> str:
+    """Lines of at most `width` columns."""
+    lines = [line for word, text in head_of(document) for line in wrapped(text, f"{word:<7}", width=width)]
     for section in sections_of(document):
-        lines += ["", section.title, *_columns(section)]
+        lines += ["", section.title, *_columns(section, width)]
     return "\n".join(lines) + "\n"
 
 
@@ -272,10 +272,10 @@ _NARROW = 14
 """Least columns of a value beside a name."""
 
 
-def _columns(section: Section) -> Iterator[str]:
+def _columns(section: Section, columns: int) -> Iterator[str]:
     """A table in text: names that are too long go on below, values stand under each other."""
     values = [max(len(row[i]) for row in (section.header, *section.rows)) for i in range(1, len(section.header))]
-    room = max(80 - 2 - sum(values) - 2 * len(values), _NARROW)
+    room = max(columns - 2 - sum(values) - 2 * len(values), _NARROW)
     width = min(max(len(row[0]) for row in section.rows), room)
     for row in (section.header, *section.rows):
         first, *rest = wrapped(row[0], "  ", "    ", width + 2) or ["  "]

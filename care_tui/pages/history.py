@@ -15,17 +15,18 @@ from care_core.diagnose.verdict import fit_words
 from care_core.errors import CareError
 from care_core.text import clean
 from care_tui.messages import OpenLog
-from care_tui.pages.page import Page, View, enter_to, sentence, view_of
-from care_tui.render.rows import ASCII, Row, Rows, error_rows, labelled, padded, plain_rows, text
+from care_tui.pages.page import OPEN, Page, View, enter_to, sentence, view_of
+from care_tui.render.rows import ASCII, Row, Rows, by_options, error_rows, labelled, padded, plain_rows, shortened, text
 from care_tui.widgets.choices import Listing
 
-NAME_WIDTH, VALUE_WIDTH = 18, 16
+NAME_WIDTH, VALUE_WIDTH, LOG_WIDTH = 18, 16, 26
 RUNS, WHOLE = "runs", "both logs"
 TREND = 24
 """Newest runs that a trend shows."""
 
 
 class HistoryPage(Page):
+    FITS = True
     HELP = (
         "Runs that were triaged before, the newest first, with the trend of every objective up to the one under the "
         "cursor. Enter opens its log. x marks a run; then every other is compared with it, and Enter puts both logs "
@@ -74,14 +75,17 @@ class HistoryPage(Page):
         whole = self.fetched(WHOLE, lambda: compare(one, other, _silent))
         if isinstance(whole, CareError):
             return error_rows(whole)
-        return sentence("Putting both side by side...") if whole is None else plain_rows(whole)
+        if whole is None:
+            return sentence("Putting both side by side...")
+        return plain_rows(whole(self.reader.room.width))
 
     def _item(self, past: Past) -> Content:
         mark = "*" if past == self._marked else " "
         line = Content(f"{mark} {past.at[:16].replace('T', ' ')}  ")
         fit = "" if past.fit == "fits" else f"  ({fit_words(past.profile, past.fit).removeprefix('Profile ')})"
-        fit += f"  (with {past.judged_with})" if past.judged_with else ""
-        return line + padded(_named(past), 26, "bold") + text(f" {past.verdict}") + text(fit, "dim")
+        name = shortened(_named(past), LOG_WIDTH, self.glyphs)
+        told = f" {by_options(past.judged_with)}{past.verdict}"
+        return line + padded(name, LOG_WIDTH, "bold") + text(told) + text(fit, "dim")
 
     def _detail(self, index: int, runs: list[Past]) -> list[Row]:
         past, other = runs[index], self._marked
@@ -111,12 +115,28 @@ class HistoryPage(Page):
             return ""
         return f"{sparkline(known, ascii=self.glyphs is ASCII)}  {min(known):.4g} to {max(known):.4g}"
 
+    @property
+    def _here(self) -> Past | None:
+        """The run under the cursor."""
+        return self._runs[self.index] if self._runs and self.index is not None else None
+
+    @property
+    def _is_beside(self) -> bool:
+        """Whether another run is marked, to be compared with that under the cursor."""
+        return self._marked is not None and self._here != self._marked
+
+    def label(self, binding: Binding) -> str:
+        return "Both in full" if binding.id == OPEN and self._is_beside else super().label(binding)
+
+    def moved(self, index: int) -> None:
+        self.refresh_bindings()
+
     def action_open(self) -> None:
         """Open the log of the run under the cursor, or put it beside the one that is marked."""
-        if not self._runs or self.index is None:
+        past = self._here
+        if past is None:
             return
-        past = self._runs[self.index]
-        if self._marked is None or past == self._marked:
+        if self._marked is None or not self._is_beside:
             self.post_message(OpenLog(Path(past.log)))
             return
         self._compared = self._marked, past
@@ -125,11 +145,12 @@ class HistoryPage(Page):
 
     def action_mark(self) -> None:
         """Mark the run under the cursor to compare others with, or take the mark away."""
-        runs, index = self._runs, self.index
-        if runs and index is not None:
-            self._marked = None if runs[index] == self._marked else runs[index]
+        past = self._here
+        if past is not None:
+            self._marked = None if past == self._marked else past
             self.show()
-            if self._marked is not None and len(runs) > 1:
+            self.refresh_bindings()
+            if self._marked is not None and len(self._runs) > 1:
                 self.say("Marked: go to another run to compare it with this one.")
 
 

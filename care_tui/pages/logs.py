@@ -25,7 +25,7 @@ from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Judge, OpenLog
 from care_tui.pages.page import Page, View, enter_to
 from care_tui.places import LogFile, found_logs
-from care_tui.render.rows import Row, Rows, error_rows, labelled, status, text
+from care_tui.render.rows import Row, Rows, by_options, error_rows, labelled, shortened, status, text
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.session import Session
 from care_tui.widgets.choices import Listing
@@ -168,11 +168,10 @@ class LogsPage(Page):
 
     def _named(self, path: Path) -> Content:
         """The name of a log, with the folders between it and the folder that was named, of which the end tells most."""
-        named, inside = text(path.name, "bold"), self.workspace.folder
+        named = text(shortened(path.name, NAME_WIDTH, self.glyphs), "bold")
+        inside = self.workspace.folder
         between = path.parent.relative_to(inside) if inside and path.is_relative_to(inside) else Path()
         room = NAME_WIDTH - named.cell_length - 1
-        if named.cell_length > NAME_WIDTH:
-            return named.truncate(NAME_WIDTH - 1) + self.glyphs.more
         if between == Path() or room < 2:
             return named
         folders = clean(str(between))
@@ -184,9 +183,7 @@ class LogsPage(Page):
         mark = self.glyphs.here if log.path == self.session.path else " "
         known = self._known.get(log.path)
         verdict = Content("") if known is None else _status(known.status, self)
-        words = "" if known is None else known.words
-        if known is not None and known.judged_with:
-            words = f"(with {known.judged_with}) {words}"
+        words = "" if known is None else by_options(known.judged_with) + known.words
         is_told = bool(words) and width < ROOMY
         about = " " if is_told else f" {age(now - log.modified_s):>10}  {size(log.size):>8}  "
         named = self._named(log.path)

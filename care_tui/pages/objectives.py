@@ -39,6 +39,7 @@ def _wrong(bound: Threshold | None, typed: str) -> str:
 
 class ObjectivesPage(DiagnosisPage):
     NAME = "objectives"
+    FITS = True
     NOTHING = "nothing is judged"
     HELP = (
         "What the mission is judged by. Enter shows what caused the fault under the cursor, else the first fault that "
@@ -79,7 +80,7 @@ class ObjectivesPage(DiagnosisPage):
         result = diagnosis.objectives[index]
         reference = case.reading.judged.reference.config if case and case.reading else {}
         summary = case.model.summary_at(result.variable.name, reference) if case and case.model else None
-        rows = objective_detail(result, summary, self.glyphs)
+        rows = objective_detail(result, summary, self.glyphs, self.reader.room.width)
         return Rows([*rows, *folded("This run", run_rows(diagnosis).rows, self.glyphs, is_open=self._is_open)])
 
     def moved(self, index: int) -> None:

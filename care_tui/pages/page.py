@@ -7,7 +7,7 @@ from typing import ClassVar, TypeVar
 
 from textual import on
 from textual.app import ComposeResult
-from textual.binding import Binding, BindingType
+from textual.binding import ActiveBinding, Binding, BindingType
 from textual.containers import Container
 from textual.content import Content
 from textual.events import Resize
@@ -113,6 +113,10 @@ class Page(Container):
 
     def look_at(self, moment_s: float | None, subject: Subject | None) -> None:
         """Show what was at this moment, or what proves this, where the page can."""
+
+    def label(self, binding: Binding) -> str:
+        """What a key of the page does now, in a word or two."""
+        return binding.description
 
     def help_first(self) -> list[Row]:
         """What the help begins with: of what stands under the cursor."""
@@ -245,6 +249,11 @@ class Page(Container):
     def go(self, page: str, moment_s: float | None = None, subject: Subject | None = None) -> None:
         """Have another page turned to."""
         self.post_message(Go(page, moment_s, subject))
+
+
+def label_of(active: ActiveBinding) -> str:
+    """What a key does now, in a word or two."""
+    return active.node.label(active.binding) if isinstance(active.node, Page) else active.binding.description
 
 
 def view_of(title: str, answer: T | CareError | None, show: Callable[[T], View]) -> View:

@@ -12,6 +12,7 @@ from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.run import Damage, Evidence, is_known
 from care_core.text import clean, seconds
 from care_tui.render.rows import (
+    LABEL_WIDTH,
     Glyphs,
     Row,
     Rows,
@@ -32,6 +33,7 @@ STATUS_WIDTH = 17
 VALUE_WIDTH = 11
 BOUND_WIDTH = 12
 STRIP_WIDTH = 42
+"""Cells of the ruler at most."""
 SHORTEST_REASON = 12
 """Cells below which the beginning of a reason tells nothing; it stands below in full."""
 
@@ -60,8 +62,8 @@ def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs, room: in
     return line + text(result.reason, "dim") if room - line.cell_length >= SHORTEST_REASON else line
 
 
-def objective_detail(result: ObjectiveResult, summary: Summary | None, glyphs: Glyphs) -> list[Row]:
-    """Why it was not evaluated, or where its value lies among the training runs."""
+def objective_detail(result: ObjectiveResult, summary: Summary | None, glyphs: Glyphs, room: int) -> list[Row]:
+    """Why it was not evaluated, or where its value lies among the training runs, as a ruler that fits the room."""
     variable = result.variable
     rows = [labelled("About", variable.doc)] if variable.doc else []
     if result.basis:
@@ -72,7 +74,7 @@ def objective_detail(result: ObjectiveResult, summary: Summary | None, glyphs: G
         return rows
     if summary is None:
         return [*rows, labelled("Distribution", "the profile holds none for this objective")]
-    rows.append(labelled("", _strip(result, summary, glyphs)))
+    rows.append(labelled("", _strip(result, summary, glyphs, min(STRIP_WIDTH, room - LABEL_WIDTH))))
     below = percent(summary.percentile(result.value))
     middle = measure(summary.quantiles[len(summary.quantiles) // 2], variable.unit)
     rows.append(labelled("Distribution", f"{below} of {summary.count} training runs are lower; the middle is {middle}"))
@@ -80,7 +82,7 @@ def objective_detail(result: ObjectiveResult, summary: Summary | None, glyphs: G
     return [*rows, Row(Content.styled(" " * 14 + signs, "dim"), 14)]
 
 
-def _strip(result: ObjectiveResult, summary: Summary, glyphs: Glyphs) -> Content:
+def _strip(result: ObjectiveResult, summary: Summary, glyphs: Glyphs, width: int) -> Content:
     """The training runs from least to most as a line, with this run's value and the threshold on it."""
     assert result.value is not None
     quantiles, bound = summary.quantiles, result.threshold
@@ -88,9 +90,9 @@ def _strip(result: ObjectiveResult, summary: Summary, glyphs: Glyphs) -> Content
     low, high = min(quantiles[0], *marks), max(quantiles[-1], *marks)
 
     def place(value: float) -> int:
-        return round((value - low) / ((high - low) or 1.0) * (STRIP_WIDTH - 1))
+        return round((value - low) / ((high - low) or 1.0) * (width - 1))
 
-    cells = [" "] * STRIP_WIDTH
+    cells = [" "] * width
     for start, end, sign in ((0, -1, glyphs.rule), (len(quantiles) // 4, 3 * len(quantiles) // 4, glyphs.done)):
         first, last = place(quantiles[start]), place(quantiles[end])
         cells[first : last + 1] = sign * (last + 1 - first)

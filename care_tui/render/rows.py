@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from rich.cells import cell_len
+from rich.cells import cell_len, set_cell_size
 from rich.segment import Segment
 from textual.content import Content
 from textual.css.styles import RulesMap
@@ -167,6 +167,28 @@ def text(value: str, style: str = "") -> Content:
 def cut(line: Content, width: int, glyphs: Glyphs) -> Content:
     """The line where it fits, else its beginning with the sign for more."""
     return line if line.cell_length <= width else line.truncate(max(width - 1, 1)) + glyphs.more
+
+
+def shortened(name: str, width: int, glyphs: Glyphs) -> str:
+    """A name where it fits, else without its middle: what tells files of one place apart is at their ends."""
+    name = clean(name)
+    if cell_len(name) <= width:
+        return name
+    head = width // 3
+    tail = width - head - len(glyphs.more)
+    return f"{set_cell_size(name, head).rstrip()}{glyphs.more}{_last_cells(name, tail)}"
+
+
+def _last_cells(name: str, width: int) -> str:
+    while cell_len(name) > width:
+        name = name[1:]
+    return name
+
+
+def by_options(judged_with: str) -> str:
+    """The names of the options that a verdict was judged with, to stand before it in a list."""
+    names = dict.fromkeys(option.partition(" ")[0] for option in judged_with.split(", "))
+    return f"(with {', '.join(names)}) " if judged_with else ""
 
 
 def joined(parts: Iterable[Content], gap: str) -> Content:

@@ -32,8 +32,9 @@ from care_tui.messages import Answered, Decided, Go, Judge, OpenLog, Progressed
 from care_tui.page_names import LOGS, NAMES, PAGES, STEPS, VIEWS
 from care_tui.pages.logs import Known, LogsPage
 from care_tui.pages.making import make_page
-from care_tui.pages.page import Page
+from care_tui.pages.page import Page, label_of
 from care_tui.places import remember
+from care_tui.render.rows import shortened
 from care_tui.session import Session
 from care_tui.widgets.answer_bar import AnswerBar
 from care_tui.widgets.filter_bar import FilterBar
@@ -104,7 +105,7 @@ class CaseScreen(Screen[None]):
         yield AnswerBar(self.workspace.glyphs)
         yield ContentSwitcher(id="pages")
         yield FilterBar()
-        yield Keys(self.workspace.glyphs)
+        yield Keys(self.workspace.glyphs, label_of)
 
     async def on_mount(self) -> None:
         request = self.workspace.request
@@ -180,9 +181,9 @@ class CaseScreen(Screen[None]):
         self.query_one("#step-tabs", TabRow).mark(self.here, empty)
         self.query_one("#view-tabs", TabRow).mark(self.here, [page.name for page in VIEWS if self._lacks(page.name)])
         room = self.app.size.width - STEPS_WIDTH
-        name = "" if session.path is None or room < SHORTEST_NAME else clean(session.path.name)
-        if len(name) > room:
-            name = name[: room - 1] + self.workspace.glyphs.more
+        name = ""
+        if session.path is not None and room >= SHORTEST_NAME:
+            name = shortened(session.path.name, room, self.workspace.glyphs)
         shown = self.query_one("#log-name", Static)
         if shown.content != name:
             shown.update(name)

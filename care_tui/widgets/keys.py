@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from textual.binding import Binding
+from collections.abc import Callable
+
+from textual.binding import ActiveBinding
 from textual.content import Content
 from textual.screen import Screen
 from textual.style import Style
@@ -18,9 +20,11 @@ class Keys(Static):
     """One text, where Textual's footer has a widget for each key: those are laid out anew at each step, which costs
     more than all the rest of it. A click on a key presses it."""
 
-    def __init__(self, glyphs: Glyphs) -> None:
+    def __init__(self, glyphs: Glyphs, label_of: Callable[[ActiveBinding], str]) -> None:
+        """Args: label_of: what a key does now, in a word or two."""
         super().__init__(markup=False)
         self._glyphs = glyphs
+        self._label_of = label_of
         self._keys = Content()
 
     def on_mount(self) -> None:
@@ -31,25 +35,25 @@ class Keys(Static):
 
     def tell(self, screen: Screen[object]) -> None:
         """Show the keys that work now."""
-        shown = {
-            one.binding.action: one.binding for one in reversed(screen.active_bindings.values()) if one.binding.show
-        }
+        shown = {one.binding.action: one for one in reversed(screen.active_bindings.values()) if one.binding.show}
         content = self._fitting(list(reversed(shown.values())))
         if not self._keys.is_same(content):
             self._keys = content
             self.update(content, layout=False)
 
-    def _fitting(self, bindings: list[Binding]) -> Content:
+    def _fitting(self, bindings: list[ActiveBinding]) -> Content:
         """The keys that the line has room for: help stays, which lists them all, and the way back is known best."""
         width = self.size.width or self.app.size.width
-        always = [self._key(one) for one in bindings if one.id in _ALWAYS]
-        own = sorted((one for one in bindings if one.id not in _ALWAYS), key=lambda one: one.id == _BACK)
+        always = [self._key(one) for one in bindings if one.binding.id in _ALWAYS]
+        others = (one for one in bindings if one.binding.id not in _ALWAYS)
+        own = sorted(others, key=lambda one: one.binding.id == _BACK)
         keys = [self._key(one) for one in own]
         while keys and joined([*keys, *always], "  ").cell_length > width:
             keys.pop()
         return cut(joined([*keys, *always], "  "), width, self._glyphs)
 
-    def _key(self, binding: Binding) -> Content:
-        return Content.assemble(
-            (self.app.get_key_display(binding), "bold $footer-key-foreground"), f" {binding.description}"
-        ).stylize(Style.from_meta({"@click": f"app.simulate_key('{binding.key}')"}))
+    def _key(self, active: ActiveBinding) -> Content:
+        key = self.app.get_key_display(active.binding)
+        return Content.assemble((key, "bold $footer-key-foreground"), f" {self._label_of(active)}").stylize(
+            Style.from_meta({"@click": f"app.simulate_key('{active.binding.key}')"})
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,8 +19,7 @@ from care_tui.app import CareApp
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, fake_engine, settle
-from tests.tui.test_walk import items, text, title
-
+from tests.tui.test_walk import items, shown, text, title
 
 ROOT = Path(__file__).parents[2]
 
@@ -103,21 +103,25 @@ async def test_enter_puts_a_run_and_the_marked_one_side_by_side_in_full() -> Non
         assert remember_triage(run_of(number, time_s, speed)) is None
     asked: list[tuple[Request, Request]] = []
 
-    def compare(a: Request, b: Request, _progress: object) -> str:
+    def compare(a: Request, b: Request, _progress: object) -> Callable[[int], str]:
         asked.append((a, b))
         if len(asked) > 1:
             raise CareError("No such file.", where=str(b.log))
-        return "First  at 2.6 s throttle goes apart"
+        return lambda width: f"First  at 2.6 s throttle goes apart\n{'-' * width}"
 
     engine = replace(fake_engine(lambda _request, _progress: Case(run_of(42, 187.0, 16.0))), compare=compare)
     app = CareApp(Request(LOG), engine=replace(engine, remember=remember_triage), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "y", "j", "x", "k")
         assert "both in full" in title(app)
+        assert "enter Both in full" in shown(app)
         await settle(pilot, "enter")
         assert [one.log.name for one in asked[0]] == ["00000002.BIN", "00000042.BIN"], "the marked one is A"
         assert "at 2.6 s throttle goes apart" in text(app)
-        await settle(pilot, "j", "j")
+        assert all(line.strip() != "-" for line in shown(app).splitlines()), "made as wide as the pane: wrapped once"
+        await settle(pilot, "j")
+        assert "enter Open its log" in shown(app), "of the marked one itself"
+        await settle(pilot, "j")
         assert "mission_time" in text(app), "of another pair what the history knows comes first"
         await settle(pilot, "enter")
         assert "No such file." in text(app)
@@ -170,8 +174,8 @@ async def test_a_verdict_by_limits_of_ones_own_is_marked_in_history_and_logs() -
     app, _ = asking_app(with_limit)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot, "y")
-        assert "(with --threshold mission_time=20)" in items(app)
-        assert "not by its own limits" in text(app)
+        assert "(with --threshold) " in items(app)
+        assert "with --threshold mission_time=20, not by its own limits" in text(app)
     (remembered,) = store().triages()
     assert remembered.judged_with == "--threshold mission_time=20"
     assert "(judged with --threshold mission_time=20)" in history_text(history_document(store().triages(), ()))
@@ -186,4 +190,4 @@ async def test_a_verdict_by_other_options_is_not_that_of_a_folder(tmp_path: Path
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
         assert [request.thresholds for request in asked] == [{"mission_time": 20.0}]
-        assert "(with --threshold mission_time=20)" in items(app)
+        assert "(with --threshold) " in items(app)

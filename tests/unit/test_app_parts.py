@@ -9,15 +9,20 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.cells import cell_len
 
 from care_core.application.case import decided
+from care_core.causal.model import Summary
 from care_core.errors import ConfigError, UsageError
 from care_core.records import replace
 from care_core.variables import Role, Variable
 from care_tui.basket import Basket, is_advisable, nudged, parsed, possible
 from care_tui.clipboard import MAX_BYTES, fits, osc52
+from care_tui.render.objectives import objective_detail
+from care_tui.render.rows import UNICODE, shortened
 from care_tui.settings import Settings, load_settings, prepare_terminal, takes_only_ascii, with_flags
 from tests.made import made_diagnosis
+from tests.tui import sample_diagnosis as sample
 
 FLOAT = Variable("gain", Role.OPTION, "float", "", "", (0.01, 10.0), 1.0)
 INT = Variable("speed", Role.OPTION, "int", "cm/s", "", (30, 200), 50)
@@ -179,3 +184,21 @@ def test_a_parameter_that_is_set_aside_takes_no_advice_about_another_along() -> 
     advice = ("change only gain to 1: it would settle it", "change only gain_up to 2: it would settle it")
     made = replace(made_diagnosis(), tell_more=advice)
     assert decided(made, made.fix, {"gain": "it is a spare"}).tell_more == advice[1:]
+
+
+@pytest.mark.parametrize("name", ["a_very_long_name_of_a_flight_2026-11-20_10-12-13.BIN", "飛行" * 20 + ".BIN"])
+def test_a_long_name_keeps_both_ends(name: str) -> None:
+    told = shortened(name, 26, UNICODE)
+    assert cell_len(told) <= 26
+    assert told.startswith(name[:3])
+    assert told.endswith(".BIN")
+    assert shortened("short.BIN", 26, UNICODE) == "short.BIN"
+
+
+@pytest.mark.parametrize("room", [40, 54, 80])
+def test_the_ruler_of_an_objective_is_one_line(room: int) -> None:
+    quantiles = tuple(float(value) for value in range(100, 201, 10))
+    summary = Summary(count=500, mean=150.0, sd=30.0, quantiles=quantiles)
+    rows = objective_detail(sample.SLOW, summary, UNICODE, room)
+    (ruler,) = [row for row in rows if UNICODE.rule * 5 in row.content.plain]
+    assert ruler.content.cell_length <= room
