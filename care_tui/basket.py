@@ -81,21 +81,18 @@ def nudged(option: Variable, value: float, by: int) -> float:
 
 
 def parsed(option: Variable, text: str) -> float:
-    """What the operator typed for an option, as `care whatif` takes it: a number, a label, or true and false.
+    """What the operator typed for an option: a number, a label, or true and false.
 
     Raises:
-        ValueError: it is none of these; the message says what is.
+        ValueError: it is none of these, or the option may not have this value; the message says what it may be.
     """
     value = option_value(option, Setting(option.name, text, "typed"))
     if value is None:
         raise ValueError(f"'{text}' is not a number. {possible(option)}")
+    is_whole = option.type not in ("int", "bool") or value == round(value)
+    if not (option.accepts(value) and is_whole):
+        raise ValueError(f"'{text}' cannot be taken. {possible(option)}")
     return value
-
-
-def is_advisable(option: Variable, value: float) -> bool:
-    """Whether a change may go into a report: others can only be asked about."""
-    whole = option.type not in ("int", "bool") or value == round(value)
-    return option.accepts(value) and whole
 
 
 def possible(option: Variable) -> str:

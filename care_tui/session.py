@@ -15,7 +15,7 @@ from care_core.errors import CareError
 from care_core.records import Struct, field, replace
 from care_core.report.formats import FILE_FORMATS, Format
 from care_core.variables import Variable
-from care_tui.basket import Basket, is_advisable, possible
+from care_tui.basket import Basket
 
 State = Literal["empty", "loading", "data", "error"]
 
@@ -235,20 +235,9 @@ class Session(Struct, eq=False):
         run = self.diagnosis.run
         return option.name not in run.config and option.name not in run.settings
 
-    @property
-    def only_asked(self) -> str:
-        """Why what is ticked can be asked about and not advised; empty where it can be advised."""
-        options = {option.name: option for option in self.options()} if self.basket.ticked else {}
-        for name, value in self.basket.ticked.items():
-            if not is_advisable(options[name], value):
-                return (
-                    f"{name} {options[name].show(value)} is only asked about and not advised. {possible(options[name])}"
-                )
-        return ""
-
     def decided(self) -> Diagnosis:
-        """The diagnosis with the ticked changes as its fix, if they can be advised, and the causes set aside."""
-        return decided(self.diagnosis, None if self.only_asked else self.fix, self.dismissed)
+        """The diagnosis with the ticked changes as its fix, and the causes set aside."""
+        return decided(self.diagnosis, self.fix, self.dismissed)
 
     def decided_case(self) -> Case:
         """The case with that diagnosis; only asked for in the state `data`."""

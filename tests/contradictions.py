@@ -320,3 +320,10 @@ def _(report: Report) -> bool:
     row = next((one for one in report.missions if one.judged), None)
     broken = any(one.status == "fault" for one in report.objectives)
     return row is not None and (row.status == "fault") != broken
+
+
+@_named("the mission's row calls OK what the report does not evaluate, or the other way round")
+def _(report: Report) -> bool:
+    row = next((one for one in report.missions if one.judged), None)
+    verdict = report.verdict.status
+    return row is not None and "fault" not in (row.status, verdict) and row.status != verdict

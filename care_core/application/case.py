@@ -428,9 +428,11 @@ def decided(diagnosis: Diagnosis, fix: Fix | None, dismissed: Mapping[str, str])
     diagnosis = replace(weighed_without(diagnosis, dismissed), faults=faults, tell_more=tell_more)
     if fix is None or not fix.changes:
         return replace(diagnosis, fix=None, alternatives=fixes(diagnosis), dismissed=aside)
-    wanted = changes_of(fix)
+    wanted, suggested = changes_of(fix), diagnosis.fix
     others = tuple(other for other in fixes(diagnosis) if changes_of(other) != wanted)
-    return replace(diagnosis, fix=fix, alternatives=others, dismissed=aside)
+    is_suggested = suggested is not None and changes_of(suggested) == wanted
+    why_this = diagnosis.why_this if is_suggested else ""
+    return replace(diagnosis, fix=fix, alternatives=others, dismissed=aside, why_this=why_this)
 
 
 def weighed_without(diagnosis: Diagnosis, dismissed: Collection[str]) -> Diagnosis:
@@ -466,4 +468,5 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
         )
     answer = replace(case.reading.question, failure=case.diagnosis.failure).ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
-    return Fix(answer.changes, answer.p_ok, predicted)
+    by_hand = bool(changes) and all(changes_of(one) != changes for one in fixes(case.diagnosis))
+    return Fix(answer.changes, answer.p_ok, predicted, by_hand=by_hand)

@@ -169,8 +169,8 @@ def patch_of(files: Iterable[EditedFile]) -> str:
     """What was changed in files, as a patch."""
     lines: list[str] = []
     for file in files:
-        before, after = file.before.splitlines(), file.after.splitlines()
-        lines += difflib.unified_diff(before, after, f"a/{file.path}", f"b/{file.path}", lineterm="")
+        before, after, name = file.before.splitlines(), file.after.splitlines(), str(file.path).lstrip("/")
+        lines += difflib.unified_diff(before, after, f"a/{name}", f"b/{name}", lineterm="")
     return "".join(f"{clean(line)}\n" for line in lines)
 
 
@@ -179,7 +179,7 @@ def diff_of(case: Case, fix: Fix, side: DiffSide) -> str:
     from care_core.configs.changes import unified_diff
 
     if side == "driven":
-        return unified_diff(case.diagnosis.run, fix.changes)
+        return unified_diff(case.diagnosis.run, fix)
     if side == "file":
         return patch_of(edited_by(case, fix))
     return _file_against_driven(case)

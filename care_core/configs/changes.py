@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from care_core.configs.driven import option_value, parameter_value, readable
 from care_core.configs.formats import format_for
@@ -12,13 +13,16 @@ from care_core.run import Run
 from care_core.text import clean
 from care_core.variables import Change, Variable
 
+if TYPE_CHECKING:
+    from care_core.diagnose.records import Fix
 
-def unified_diff(run: Run, changes: Sequence[Change]) -> str:
-    """The configuration as driven against the changes, in the ecosystem's own format; only keys that change."""
+
+def unified_diff(run: Run, fix: Fix) -> str:
+    """The configuration as driven against a fix, in the ecosystem's own format; only keys that change."""
     line_of = format_for(run.log.format, run.settings).functions.line_of
     driven, fixed = {}, {}
-    for option, parameter, suggested in _assignments(changes):
-        change = next(change for change in changes if change.option is option)
+    for option, parameter, suggested in _assignments(fix.changes):
+        change = next(change for change in fix.changes if change.option is option)
         setting = run.settings.get(parameter)
         current = None if setting is None else option_value(option, setting)
         was = change.current if current is None else current
@@ -29,7 +33,7 @@ def unified_diff(run: Run, changes: Sequence[Change]) -> str:
         [driven[parameter] for parameter in sorted(driven)],
         [fixed[parameter] for parameter in sorted(fixed)],
         fromfile="as driven",
-        tofile="suggested",
+        tofile="chosen by hand" if fix.by_hand else "suggested",
         n=0,
         lineterm="",
     )

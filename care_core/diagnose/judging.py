@@ -134,9 +134,9 @@ def verdict(judged: Judged, findings: Sequence[Finding] = ()) -> MissionVerdict:
         broken = dict.fromkeys(f"{one.title} at {log_time(one.onset_s)}" for one in critical)
     if broken:
         return MissionVerdict(judged.run.mission, "fault", "; ".join(broken), everything)
-    if judged.checks and judged.results:
-        return MissionVerdict(judged.run.mission, "ok", "no mission was flown", everything)
     unknown = [result for result in everything if result.status == "not_evaluated"]
+    if not judged.results and not unknown:
+        return MissionVerdict(judged.run.mission, "not_evaluated", "nothing that could be judged failed", everything)
     reason = unknown[0].reason if unknown else ""
     return MissionVerdict(judged.run.mission, "not_evaluated" if unknown else "ok", reason, everything)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
-from care_core.diagnose.records import Diagnosis
+from care_core.diagnose.records import Diagnosis, helps
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, vehicle_of
@@ -56,8 +56,7 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
     run, findings = diagnosis.run, diagnosis.health.findings
     upset = was_upset(run, findings)
     if diagnosis.fix is not None and not diagnosis.abstained:
-        again = f"try it {trial(run)} first" if upset else "run again"
-        return f"make the change, {again}, and check what it brought with 'care verify REPORT LOG'"
+        return _of_fix(diagnosis.fix, diagnosis, upset=upset)
     if has_failed and (undone := _undone(diagnosis)):
         return f"{undone}, then try it {trial(run)}" if upset else undone
     named = _named(diagnosis) if has_failed else ()
@@ -74,6 +73,14 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
     if run.log.format == MAVLINK_TLOG.name and run.log.facts.get("stack") == "PX4":
         return "triage the .ulg that the vehicle itself wrote: profile px4 reads it, and telemetry holds little of it"
     return "'care inspect LOG' tells what each profile would need"
+
+
+def _of_fix(fix: Fix, diagnosis: Diagnosis, *, upset: bool) -> str:
+    """What to do with a change that can be made."""
+    if fix.by_hand and not helps(fix.odds, diagnosis.odds_as_driven):
+        return "leave it as driven, or choose other values"
+    again = f"try it {trial(diagnosis.run)} first" if upset else "run again"
+    return f"make the change, {again}, and check what it brought with 'care verify REPORT LOG'"
 
 
 def _named(diagnosis: Diagnosis) -> tuple[str, ...]:

@@ -183,6 +183,11 @@ class Fault(Record):
     causes: tuple[Cause, ...]
 
 
+def helps(odds: float | None, as_driven: float | None) -> bool:
+    """Whether a change is predicted to bring more than none, as far as both were measured."""
+    return odds is None or as_driven is None or odds > as_driven
+
+
 class Fix(Record):
     """A set of changes with its predicted outcome. `p_fixed`: probability that all objectives keep their thresholds."""
 
@@ -191,6 +196,8 @@ class Fix(Record):
     predicted: Mapping[str, Prediction]
     shown_by: str = ""
     """The finding of this run that shows its cause, where training says little of it: `p_fixed` is no promise then."""
+    by_hand: bool = False
+    """Whether the operator chose it, and no suggestion is."""
 
     @property
     def odds(self) -> float | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal, Protocol, TypeVar
 
 from care_core.diagnose.next_step import next_step
-from care_core.diagnose.records import Confidence, Diagnosis, Hypothesis, Since, Status
+from care_core.diagnose.records import Confidence, Diagnosis, Hypothesis, Since, Status, helps
 from care_core.ecosystems.findings import WHOLE_LOG, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
@@ -127,6 +127,8 @@ class Advice(Record):
     """Whether a value of the change is one that no training run came near."""
     confidence: Confidence | None = None
     """How sure the cause is that the change mends."""
+    by_hand: bool = False
+    """Whether the operator chose the change: what is predicted of it is told, and nobody advises it."""
     why: str = ""
     """Why another parameter is changed than the likeliest cause, or why it adds little; empty where neither."""
     refusal: str = ""
@@ -136,8 +138,11 @@ class Advice(Record):
         if not self.change:
             return f"No change advised: {self.refusal}" if self.refusal else ""
         sure = f" ({self.confidence} confidence in the cause)" if self.confidence else ""
+        change = f"Chosen by hand: {self.change}" if self.by_hand else f"Change {self.change}{sure}"
         why = f"; {self.why}" if self.why else ""
-        return f"Change {self.change}{sure}: {promise(self.odds, self.odds_as_driven, self.is_guess)}{why}"
+        if self.by_hand and not helps(self.odds, self.odds_as_driven):
+            why = f"; it is not predicted to help{why}"
+        return f"{change}: {promise(self.odds, self.odds_as_driven, self.is_guess)}{why}"
 
 
 class Verdict(Record):
@@ -222,9 +227,9 @@ def _against(since: Since | None) -> str:
 
 
 def why_of(shown_by: str, abstained: str | None, otherwise: str) -> str:
-    """What stands beside a change: that somebody chose it where nothing is advised, what shows it, or why this one."""
+    """What stands beside a change: that nothing is advised, what shows it, or why this one."""
     if abstained:
-        return f"chosen by hand; no change is advised: {abstained}"
+        return f"no change is advised: {abstained}"
     return f"this run shows it: {shown_by}" if shown_by else otherwise
 
 
@@ -240,6 +245,7 @@ def _advice(diagnosis: Diagnosis) -> Advice:
         odds_as_driven=diagnosis.odds_as_driven,
         is_guess=fix.is_guess,
         confidence=next((cause.confidence for cause in causes if cause.option.name in changed), None),
+        by_hand=fix.by_hand,
         why=clean(why_of(fix.shown_by, diagnosis.abstained, diagnosis.why_this)),
     )
 

@@ -103,10 +103,10 @@ class ObjectiveEntry(Document, kw_only=True):
         """The value with its unit, empty where there is none."""
         return "" if self.value is None else f"{self.value:.4g} {self.unit}".rstrip()
 
-    def prediction(self, predicted: PredictedValue, is_guess: bool) -> str:
-        """A predicted value with its interval; a yes-or-no objective has a probability instead."""
+    def prediction(self, predicted: PredictedValue) -> str:
+        """A predicted value with its interval; empty for a yes-or-no objective, which has a probability alone."""
         if self.kind == "functional":
-            return chance(predicted.value, is_guess)
+            return ""
         return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {self.unit}".rstrip()
 
     @property
@@ -126,6 +126,15 @@ class PredictedValue(Document, kw_only=True):
 
 class PredictedObjective(PredictedValue, kw_only=True):
     status: Status
+
+
+class PromisedObjective(PredictedObjective, kw_only=True):
+    p_ok: Share | None = None
+    """Probability that its threshold is kept."""
+
+    def odds(self, is_guess: bool) -> str:
+        """How likely its threshold is kept, in words."""
+        return "odds not measured" if self.p_ok is None else chance(self.p_ok, is_guess)
 
 
 class CauseEntry(Document, kw_only=True):
@@ -189,7 +198,7 @@ class FixSet(Document, kw_only=True):
     """Whether a value is one that no training run came near."""
     shown_by: str = ""
     """The finding that shows the cause, where training says little of it."""
-    predicted: dict[str, PredictedObjective]
+    predicted: dict[str, PromisedObjective]
 
     @property
     def odds(self) -> float | None:
@@ -202,6 +211,8 @@ class FixSet(Document, kw_only=True):
 
 
 class FixEntry(FixSet, kw_only=True):
+    by_hand: bool = False
+    """Whether the operator chose it, and no suggestion is."""
     why_this: str = ""
     """Why another parameter is changed than the likeliest cause, or why it adds little."""
     alternatives: list[FixSet]
@@ -357,7 +368,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
         headline=verdict.headline,
         next_step=verdict.next_step,
         verdict=verdict,
-        diff="" if fix is None else unified_diff(run, fix.changes),
+        diff="" if fix is None else unified_diff(run, fix),
         apply=[] if fix is None else apply_commands(fix.changes, format_for(log.format, run.settings)),
     )
 
@@ -396,6 +407,7 @@ def _advice(document: TriageDocument) -> Advice:
         odds_as_driven=document.odds_as_driven,
         is_guess=fix.guess,
         confidence=next((cause.confidence for cause in causes if cause.option in changed), None),
+        by_hand=fix.by_hand,
         why=why_of(fix.shown_by, document.abstained, fix.why_this),
     )
 
@@ -494,19 +506,24 @@ def _fix(fix: Fix, diagnosis: Diagnosis) -> FixEntry:
     return publish(
         FixEntry,
         _fix_set(fix),
+        by_hand=fix.by_hand,
         why_this=clean(diagnosis.why_this),
         alternatives=[_fix_set(alternative) for alternative in diagnosis.alternatives],
     )
 
 
 def _fix_set(fix: Fix) -> FixSet:
-    entries = {name: predicted_objective(prediction) for name, prediction in fix.predicted.items()}
+    entries = {name: (predicted_objective(one), one.p_ok) for name, one in fix.predicted.items()}
     return FixSet(
         changes=[_change(change) for change in fix.changes],
         p_fixed=estimate(fix.odds),
         guess=fix.is_guess,
         shown_by=clean(fix.shown_by),
-        predicted={name: entry for name, entry in entries.items() if entry is not None},
+        predicted={
+            name: publish(PromisedObjective, entry, p_ok=estimate(odds))
+            for name, (entry, odds) in entries.items()
+            if entry is not None
+        },
     )
 
 

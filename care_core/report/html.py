@@ -130,7 +130,7 @@ def _causes(fault: FaultEntry, drawing: Drawing, name: str) -> dict[str, Any]:
 
 def _fix(report: Report, fix: FixEntry) -> dict[str, Any]:
     objectives = {objective.name: objective for objective in report.objectives}
-    rows = [(name, objectives[name].prediction(one, fix.guess), one.status) for name, one in fix.predicted.items()]
+    rows = [(name, objectives[name].prediction(one), one.odds(fix.guess)) for name, one in fix.predicted.items()]
     others = [other.sentence(report.odds_as_driven) for other in fix.alternatives]
     return {"rows": rows, "diff": report.diff.splitlines(), "apply": report.apply, "alternatives": others}
 

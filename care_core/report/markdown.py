@@ -109,7 +109,8 @@ def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
     objectives = {objective.name: objective for objective in report.objectives}
     yield from ("", "## Fix", "")
     for name, predicted in fix.predicted.items():
-        yield f"- {STATUS_WORDS[predicted.status]} `{name}` {objectives[name].prediction(predicted, fix.guess)}"
+        told = filter(None, (objectives[name].prediction(predicted), predicted.odds(fix.guess)))
+        yield f"- `{name}` {', '.join(told)}"
     yield from _folded("The difference to the configuration as driven", report.diff.rstrip("\n"), "diff")
     yield from ("", *_fenced("\n".join(report.apply), "sh"))
     if fix.alternatives:

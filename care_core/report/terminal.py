@@ -153,7 +153,8 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     if fix is None:
         return
     as_driven = diagnosis.odds_as_driven
-    yield from wrapped(f"Fix ({promise(fix.odds, as_driven, fix.is_guess)})")
+    title = "Fix, chosen by hand" if fix.by_hand else "Fix"
+    yield from wrapped(f"{title} ({promise(fix.odds, as_driven, fix.is_guess)})")
     if fix.why_not_measured:
         yield from wrapped(f"odds not measured: {fix.why_not_measured}", "  ", "    ")
     for change in fix.changes:
@@ -170,7 +171,7 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         likely = promise(other.odds, as_driven, other.is_guess)
         yield from wrapped(f"or {', '.join(map(str, other.changes))}: {likely}", "  ", "     ")
     yield ""
-    yield from (f"  {line}" for line in unified_diff(diagnosis.run, fix.changes).splitlines())
+    yield from (f"  {line}" for line in unified_diff(diagnosis.run, fix).splitlines())
     yield ""
     yield from (
         f"  {line}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -11,6 +11,7 @@ from textual.content import Content
 
 from care_core.application.case import changes_of
 from care_core.application.configuring import DiffSide
+from care_core.diagnose.records import Fix, helps
 from care_core.errors import CareError
 from care_core.records import replace
 from care_core.text import clean
@@ -24,10 +25,13 @@ from care_tui.screens.confirm import Confirm
 from care_tui.screens.prompt import Prompt
 
 SIDES: dict[DiffSide, str] = {
-    "driven": "As driven (-) against suggested (+)",
-    "file": "Your file (-) against suggested (+)",
+    "driven": "As driven (-) against the change (+)",
+    "file": "Your file (-) against the change (+)",
     "changed": "As driven (-) against your file (+)",
 }
+TURNS: dict[DiffSide, str] = {"driven": "As driven", "file": "My file", "changed": "My file as driven"}
+"""What a key says that turns to each."""
+HELD = "The file holds these values already: there is nothing to put into it."
 DIFF, APPLY, DOUBTS = "diff", "apply", "doubts"
 
 
@@ -41,9 +45,9 @@ class DiffPage(DiagnosisPage):
     NAME = "diff"
     NOTHING = "nothing is to be changed"
     HELP = (
-        "Lines with - are what is, lines with + what is suggested. f compares with your own file, which it asks for, F "
-        "with another; A puts the change into that file: comments stay, the old one is kept beside. c copies the diff. "
-        "Enter goes to the report. Nothing is written to the robot."
+        "Lines with - are what is, lines with + what it would become. f compares with your own file, which it asks "
+        "for, F with another; A puts the change into that file: comments stay, the old one is kept beside. c copies "
+        "the diff. Enter goes to the report. Nothing is written to the robot."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Report"),
@@ -58,8 +62,6 @@ class DiffPage(DiagnosisPage):
         self.forget(DIFF)
         case, fix, side = self.session.case, self.session.fix, self.side
         if case is None or fix is None or not (fix.changes or side == "changed") or not self.has_content:
-            return
-        if self.session.only_asked:
             return
         engine, decided = self.workspace.engine, self.session.decided()
         # A file that the change was put into is not what the robot ran, as it should be.
@@ -84,8 +86,6 @@ class DiffPage(DiagnosisPage):
             notes = [warning("File", clean(doubt)) for doubt in doubts]
             lines = diff_rows(diff or "No difference.\n").rows
             return View(title, lambda _: Rows([*notes, *lines, *command_rows(commands)]))
-        if session.only_asked:
-            return View(Content("Nothing is advised"), lambda _: sentence(session.only_asked))
         if session.basket.ticked and session.fix_error is not None:
             error = session.fix_error
             return View(title, lambda _: error_rows(error))
@@ -107,8 +107,17 @@ class DiffPage(DiagnosisPage):
         if case is None or not case.configs:
             self._ask_for_file()
             return
-        sides = list(SIDES)
-        self._turn(sides[(sides.index(self.side) + 1) % len(sides)])
+        self._turn(self._next_side)
+
+    @property
+    def _next_side(self) -> DiffSide:
+        case, sides = self.session.case, list(SIDES)
+        if case is None or not case.configs:
+            return "file"
+        return sides[(sides.index(self.side) + 1) % len(sides)]
+
+    def label(self, binding: Binding) -> str:
+        return TURNS[self._next_side] if binding.id == "diff.side" else super().label(binding)
 
     def action_other_file(self) -> None:
         """Name another file than the one before."""
@@ -118,6 +127,7 @@ class DiffPage(DiagnosisPage):
         self.side = side
         self.enter()
         self.show()
+        self.refresh_bindings()
 
     def _ask_for_file(self, *, to_apply: bool = False) -> None:
         title = "Apply to which file?" if to_apply else "Compare with which file?"
@@ -141,32 +151,36 @@ class DiffPage(DiagnosisPage):
     def action_apply(self) -> None:
         """Put the change into the operator's file, once that is confirmed; the old one is kept beside."""
         case, fix = self.session.case, self.session.fix
-        if case is None or fix is None or not fix.changes or self.session.only_asked:
-            self.say(self.session.only_asked or "No change is ticked in the fix (4).")
+        if case is None or fix is None or not fix.changes:
+            self.say("No change is ticked in the fix (4).")
         elif not case.configs:
             self._ask_for_file(to_apply=True)
         else:
-            self.ask(DOUBTS, lambda: self.workspace.engine.doubts(case, fix))
+            engine = self.workspace.engine
+            self.ask(DOUBTS, lambda: (engine.diff(case, fix, "file"), engine.doubts(case, fix)))
 
     def _confirm(self, doubts: Sequence[str]) -> None:
-        """Ask before anything is written: with the odds, how sure the cause is, and what speaks against it."""
-        case, fix, session = self.session.case, self.session.fix, self.session
+        """Ask before anything is written: with the odds, and what speaks against it."""
+        case, fix = self.session.case, self.session.fix
         if case is None or fix is None:
             return
         files = ", ".join(str(name) for name in case.configs)
-        odds = "" if fix.odds is None else f" The next run is then without a fault with {percent(fix.odds)}."
+        odds = "" if fix.odds is None else f" With {percent(fix.odds)} probability the next run then has no fault."
         question = f"Put {len(fix.changes)} change{'s' if len(fix.changes) > 1 else ''} into {files}?{odds}"
-        changed = set(changes_of(fix))
-        sure = {cause.confidence for fault in session.diagnosis.faults for cause in fault.causes
-                if cause.option.name in changed}  # fmt: skip
-        cautions = (
-            [f"confidence is {', '.join(sorted(sure))}: try it where nothing can be hurt first"]
-            if sure - {"high"}
-            else []
-        )
-        cautions += [f"{change.option.name}: {note}" for change in fix.changes for note in change.notes]
         keys = "y writes it and keeps the old one as .bak, n or Esc leaves it"
-        self.app.push_screen(Confirm(question, keys, [*doubts, *cautions]), self._confirmed)
+        self.app.push_screen(Confirm(question, keys, [*doubts, *self._cautions(fix)]), self._confirmed)
+
+    def _cautions(self, fix: Fix) -> Iterator[str]:
+        """How unsure the cause is, and what else speaks against the change."""
+        session, changed = self.session, changes_of(fix)
+        causes = (cause for fault in session.diagnosis.faults for cause in fault.causes)
+        sure = {cause.confidence for cause in causes if cause.option.name in changed}
+        if sure - {"high"}:
+            yield f"confidence is {', '.join(sorted(sure))}: try it where nothing can be hurt first"
+        driven = session.odds_unchanged()
+        if driven is not None and fix.by_hand and not helps(fix.odds, driven):
+            yield f"chosen by hand, and not predicted to help: as driven it is {percent(driven)}"
+        yield from (f"{change.option.name}: {note}" for change in fix.changes for note in change.notes)
 
     def _confirmed(self, answer: bool | None) -> None:
         case, fix = self.session.case, self.session.fix
@@ -175,10 +189,7 @@ class DiffPage(DiagnosisPage):
 
     def take(self, question: str, answer: object) -> None:
         if question == DOUBTS:
-            if isinstance(answer, CareError):
-                self.say(str(answer))
-            elif isinstance(answer, tuple):
-                self._confirm(answer)
+            self._ask_to_apply(answer)
         elif question != APPLY:
             super().take(question, answer)
         elif isinstance(answer, CareError):
@@ -186,8 +197,19 @@ class DiffPage(DiagnosisPage):
         elif isinstance(answer, list):
             self.workspace.written += [file for file, _ in answer]
             told = "; ".join(f"wrote {clean(str(file))}, the old one is {backup.name}" for file, backup in answer)
-            self.say(told or "The file holds these values already.")
+            self.say(told or HELD)
             self._turn("file")
+
+    def _ask_to_apply(self, answer: object) -> None:
+        """The difference to the file is known, and the doubts about it."""
+        if isinstance(answer, CareError):
+            self.say(str(answer))
+        elif isinstance(answer, tuple):
+            difference, doubts = answer
+            if difference:
+                self._confirm(doubts)
+            else:
+                self.say(HELD)
 
     def action_copy_diff(self) -> None:
         """Copy the diff to the operator's clipboard."""

@@ -11,7 +11,7 @@ from care_core.application.case import changes_of, fixes
 from care_core.diagnose.records import Fix
 from care_core.text import clean
 from care_core.variables import Variable
-from care_tui.basket import is_advisable, nudged, parsed, possible
+from care_tui.basket import nudged, parsed, possible
 from care_tui.messages import Decided
 from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to
@@ -112,8 +112,6 @@ class FixPage(DiagnosisPage):
             notes.append(f"past its reference, {reference}: a suggestion stops there, as far as it is known to work")
         if option.safety and value is not None and value != option.default:
             notes.append("a safety parameter: think twice before it leaves its default")
-        if value is not None and not is_advisable(option, value):
-            notes.append("it can be asked about, and does not go into the report")
         if option.name in session.dismissed:
             notes.append(f"set aside: {session.dismissed[option.name]}")
         return notes

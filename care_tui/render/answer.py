@@ -109,8 +109,8 @@ def _change(session: Session, glyphs: Glyphs, width: int) -> Content | None:
         odds = promise(fix.odds, glyphs) + Content.styled(" a guess" if fix.is_guess else "", "$text-warning")
     beside = Content.styled("" if without is None else f"  without {percent(without)}", "dim")
     again = Content.styled("  unless it happens again", "$text-warning") if session.diagnosis.lost_by else Content()
-    is_advised = not session.only_asked and not session.diagnosis.abstained
-    head = _labelled("Change" if is_advised else "Asked") + odds + Content("  ")
+    is_asked = bool(session.diagnosis.abstained) or (fix is not None and fix.by_hand)
+    head = _labelled("Asked" if is_asked else "Change") + odds + Content("  ")
     what, room = Content.assemble(text(name, "bold"), " ", change), width - head.cell_length - len(more)
     # Of what does not fit beside the change the page of the fix tells the rest.
     tails = (beside + again, again or beside, beside)

@@ -192,7 +192,8 @@ async def test_the_change_is_put_into_the_file_that_is_asked_for_and_the_old_one
         assert file.read_text() == before, "nothing is written unasked"
         await settle(pilot, "A", "y")
         assert "the old one is robot.param.bak" in app.title
-        await settle(pilot, "A", "y")
+        await settle(pilot, "A")
+        assert not isinstance(app.screen, Confirm), "there is nothing to ask"
         assert "holds these values already" in app.title
     assert file.read_text() == before.replace("16", "40")
     assert (tmp_path / "robot.param.bak").read_text() == before

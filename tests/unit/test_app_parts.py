@@ -16,7 +16,7 @@ from care_core.causal.model import Summary
 from care_core.errors import ConfigError, UsageError
 from care_core.records import replace
 from care_core.variables import Role, Variable
-from care_tui.basket import Basket, is_advisable, nudged, parsed, possible
+from care_tui.basket import Basket, nudged, parsed, possible
 from care_tui.clipboard import MAX_BYTES, fits, osc52
 from care_tui.render.objectives import objective_detail
 from care_tui.render.rows import UNICODE, shortened
@@ -90,11 +90,10 @@ def test_what_cannot_be_taken_is_refused_with_what_can(option: Variable, typed: 
 
 
 @pytest.mark.parametrize(("option", "typed"), [(FLOAT, "11"), (INT, "50.5"), (ENUM, "1"), (INT, "1e9")])
-def test_what_whatif_answers_the_app_asks_too_but_only_what_is_acceptable_is_advised(
-    option: Variable, typed: str
-) -> None:
-    assert not is_advisable(option, parsed(option, typed))
-    assert is_advisable(option, option.snap(parsed(option, typed)))
+def test_a_value_that_the_option_may_not_have_is_refused(option: Variable, typed: str) -> None:
+    with pytest.raises(ValueError, match="cannot be taken") as refused:
+        parsed(option, typed)
+    assert possible(option) in str(refused.value)
 
 
 def test_osc_52_is_wrapped_for_the_multiplexer() -> None:

@@ -9,6 +9,10 @@ from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.diagnose.verdict import verdict_of
 from care_core.ecosystems.findings import Finding, Health
 from care_core.records import replace
+from care_core.report.document import build_document, remembered_verdict
+from care_core.report.reading import remembered
+from care_core.report.terminal import to_text
+from care_core.report.writers import published
 from care_core.run import Check, Evidence
 from tests.made import made_diagnosis, made_run
 
@@ -97,7 +101,7 @@ def test_what_can_be_put_right_at_once_comes_first() -> None:
 def test_a_change_that_was_chosen_by_hand_does_not_come_before_what_failed() -> None:
     chosen = replace(failed(THRUST, fixed=True), abstained="too little thrust: nothing is changed until that is mended")
     assert next_step(chosen, has_failed=True).startswith("check on the bench: too little thrust; then try it")
-    assert "chosen by hand; no change is advised: too little thrust" in str(verdict_of(chosen).advice)
+    assert "no change is advised: too little thrust" in str(verdict_of(chosen).advice)
 
 
 def test_a_parameter_that_is_to_stay_is_not_put_back() -> None:
@@ -107,3 +111,18 @@ def test_a_parameter_that_is_to_stay_is_not_put_back() -> None:
     assert next_step(kept, has_failed=True) == "let A change as well: without it nothing is likely enough"
     free = replace(kept, abstained="nothing is likely enough")
     assert next_step(free, has_failed=True) == "put A back as the findings say"
+
+
+@pytest.mark.parametrize(("odds", "helps"), [(0.9, True), (0.2, False), (0.01, False)])
+def test_what_an_operator_chose_is_told_with_its_odds_and_never_suggested(odds: float, helps: bool) -> None:
+    made = replace(failed(LATE, fixed=True), odds_as_driven=0.2, why_this="of the suggestion")
+    assert made.fix is not None
+    chosen = replace(made, fix=replace(made.fix, p_fixed=odds, by_hand=True), why_this="")
+    told = verdict_of(chosen)
+    assert str(told.advice).startswith("Chosen by hand: land_speed 16 -> 50: ")
+    assert "confidence in the cause" not in str(told.advice)
+    assert ("it is not predicted to help" in str(told.advice)) is not helps
+    assert ("make the change" in told.next_step) is helps
+    document = remembered(published(build_document(chosen)))
+    assert str(remembered_verdict(document).advice) == str(told.advice)
+    assert "+++ chosen by hand" in to_text(chosen)

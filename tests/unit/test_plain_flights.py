@@ -186,12 +186,13 @@ def test_several_missions_are_listed_with_their_verdicts() -> None:
     schema = read_schema(PROFILE)
     run = made_run()
     missions = []
+    unflown: dict[str, Value] = {one.name: Unavailable("no mission was flown") for one in schema.objectives}
     for index, crashed in enumerate((1.0, 0.0), start=1):
         one = replace(run, mission=MissionInfo(index, 2, 100.0 * index, 100.0 * index + 50, ended=True, fits=True),
-                      checks=(Check("no_crash", crashed, ""),), objectives={})  # fmt: skip
+                      checks=(Check("no_crash", crashed, ""),), objectives=unflown)  # fmt: skip
         missions.append(verdict(judge(one, schema, None)))
     shown = to_text(replace(made_diagnosis(), missions=tuple(missions)))
-    assert "   1  OK, 100 s (1:40) to 150 s (2:30): no mission was flown  <- this report" in shown
+    assert "   1  NOT EVALUATED, 100 s (1:40) to 150 s (2:30): no mission was flown" in shown, "as its own report"
     assert "   2  FAULT, 200 s (3:20) to 250 s (4:10): no_crash" in shown
     assert "Missions of this log" not in to_text(made_diagnosis())
 

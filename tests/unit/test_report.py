@@ -52,7 +52,8 @@ def test_the_document_has_exactly_the_published_keys() -> None:
     ]  # fmt: skip
     assert cause["path"] == ["land_speed", "land_time", "mission_time"]
     assert cause["predicted"] == {"value": 140.0, "low": 130.0, "high": 149.0}
-    assert list(document["fix"]) == ["changes", "p_fixed", "guess", "shown_by", "predicted", "why_this", "alternatives"]
+    keys = ["changes", "p_fixed", "guess", "shown_by", "predicted", "by_hand", "why_this", "alternatives"]
+    assert list(document["fix"]) == keys
     assert document["fix"]["changes"] == [
         {
             "option": "land_speed",
@@ -211,7 +212,7 @@ def test_markdown_gives_probability_for_a_yes_or_no_objective_and_a_unit_for_a_m
     predicted = {**fix.predicted, name: Prediction(0.94, 1.0, 1.0, p_ok=0.94)}
     text = to_markdown(build_document(replace(diagnosis, fix=replace(fix, predicted=predicted))))
     assert f"`{name}` 94% probability" in text
-    assert re.search(r"`mission_time` .* to .*\) s$", text, re.MULTILINE)
+    assert re.search(r"`mission_time` .* to .*\) s, 92% probability$", text, re.MULTILINE)
 
 
 @pytest.mark.parametrize(("path", "span"), [("a_b*.BIN", "`a_b*.BIN`"), ("a``b`.BIN", "``` a``b`.BIN ```")])
