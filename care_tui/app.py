@@ -183,7 +183,7 @@ class CareApp(App[int], inherit_bindings=False):
     async def on_paste(self, event: Paste) -> None:
         """A file that is dropped on the terminal arrives as its pasted path."""
         path = as_path(event.text)
-        if event.text.strip() and "\n" not in event.text.strip() and (path.is_file() or is_openable(path)):
+        if event.text.strip() and "\n" not in event.text.strip() and (os.path.isfile(path) or is_openable(path)):
             while self.screen is not self._case:
                 await self.pop_screen()
             await self._case.open_log(path)
@@ -260,7 +260,7 @@ class CareApp(App[int], inherit_bindings=False):
 
 def is_folder_of_logs(path: Path) -> bool:
     """Whether this is a folder to choose a log from, and no recording that is a folder."""
-    return path.is_dir() and not is_openable(path)
+    return os.path.isdir(path) and not is_openable(path)
 
 
 def run(request: Request | None, settings: Settings) -> int:

@@ -60,17 +60,29 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "Around it": ("serve", "mcp", "doctor", "completion", "man", "schema"),
 }  # fmt: skip
 """The commands by what one wants, in the order of the help; the hidden one is in none."""
+_MISUSE: type[Exception] = typer.BadParameter.__mro__[1]
+"""What Typer raises for a command line that it cannot take."""
 
 
 class CareGroup(TyperGroup):
     """Lets `care LOG` stand beside the commands, and turns every error into a sentence and an exit code."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        own = {name for parameter in self.params for name in (*parameter.opts, "--help")}
+        own = {*self.get_help_option_names(ctx), *(name for parameter in self.params for name in parameter.opts)}
         if ctx.resilient_parsing:  # a shell completes: nothing is refused, and what stands behind a log is the app's
             is_opened = bool(args) and args[0] not in self.commands and OPEN in self.commands and _is_path(args[0])
             return super().parse_args(ctx, [OPEN, *args] if is_opened else args)
         return super().parse_args(ctx, route(args, self.commands, own))
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        _leave_reading(self)
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except _MISUSE as err:
+            raise _in_a_sentence(err) from None
 
     def list_commands(self, ctx: Any) -> list[str]:
         """The commands that are there, in the order of the help."""
@@ -104,6 +116,31 @@ class CareGroup(TyperGroup):
             if _was_interrupted(err):
                 raise KeyboardInterrupt from None
             raise SystemExit(int(explain(err))) from None
+
+
+def _leave_reading(command: Any) -> None:
+    """Have no file refused before the command looks at it: whoever reads one says what is wrong, with the exit code."""
+    for parameter in command.params:
+        if hasattr(parameter.type, "readable"):
+            parameter.type.readable = False
+    for inner in getattr(command, "commands", {}).values():
+        _leave_reading(inner)
+
+
+def _in_a_sentence(err: Any) -> UsageError:
+    """What is wrong with a command line, as every other error is told; the hidden command of the app is not named."""
+    context = err.ctx
+    command = context.command_path.removesuffix(f" {OPEN}")
+    is_app = context.info_name == OPEN
+    params = [*context.command.params, *(context.parent.command.params if is_app else ())]
+    unknown, known = getattr(err, "option_name", ""), {"--help", *(name for one in params for name in one.opts)}
+    listed = f"'{command} --help' lists what there is."
+    if not unknown:
+        message = err.format_message()
+        return UsageError(message if message.endswith((".", "?")) else f"{message}.", hint=listed)
+    long = [name for name in known if len(unknown) == 2 and name.startswith(f"-{unknown}")]
+    hint = f"Did you mean '{long[0]}'?" if len(long) == 1 else nearest(unknown, known) or listed
+    return UsageError(f"There is no option '{unknown}'.", hint=hint)
 
 
 def _was_interrupted(err: BaseException | None) -> bool:

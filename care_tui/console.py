@@ -143,5 +143,8 @@ def explain(err: Exception) -> ExitCode:
     if isinstance(err, OSError) and err.errno == errno.ENAMETOOLONG:  # wherever a path is first looked at
         say(f"care: {err.filename}: The name is longer than names of files can be. Check the path.")
         return ExitCode.USAGE
+    if isinstance(err, PermissionError) and err.filename is not None:  # it lies in a folder that is closed to us
+        say(f"care: {err.filename}: No permission to look there. Check the owner and mode of its folders.")
+        return ExitCode.UNREADABLE
     say(f"care: unexpected {type(err).__name__}: {err}. Set CARE_DEBUG=1 to see where it comes from.")
     return ExitCode.USAGE

@@ -77,7 +77,7 @@ def found_logs(places: Iterable[Path], opened: Path | None = None, *, with_recen
     What cannot be looked at is left out.
     """
     recent = recent_logs()
-    files = [path for place in places if place.is_dir() for path in logs_in(place)]
+    files = [path for place in places if os.path.isdir(place) for path in logs_in(place)]
     files += [] if opened is None else [opened]
     files += recent if with_recent else []
     unique = {path.absolute(): path.absolute() in recent for path in files}
@@ -154,7 +154,7 @@ def as_path(typed: str) -> Path:
     typed = typed.strip()
     if len(typed) > 1 and typed[0] == typed[-1] and typed[0] in "'\"":
         typed = typed[1:-1]
-    elif not Path(typed).exists():
+    elif not os.path.exists(typed):  # a folder that is closed to us is no error
         typed = typed.replace("\\ ", " ")
     if typed.startswith("file://"):
         from urllib.parse import unquote

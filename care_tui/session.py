@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
@@ -61,7 +62,7 @@ class Session(Struct, eq=False):
     @property
     def is_readable(self) -> bool:
         """Whether there is a log to look into, though it may have no diagnosis."""
-        return self.case is not None or (self.state == "error" and self.path is not None and self.path.exists())
+        return self.case is not None or (self.state == "error" and self.path is not None and os.path.exists(self.path))
 
     @property
     def diagnosis(self) -> Diagnosis:

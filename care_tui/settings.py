@@ -116,7 +116,9 @@ def with_flags(settings: Settings, *, ascii: bool, mouse: bool, color: str | Non
         UsageError: a flag has a value that the setting cannot have.
     """
     if color is not None and color not in COLORS:
-        raise UsageError(f"--color cannot be '{color}'.", hint=f"Allowed: {', '.join(COLORS)}.", where="--color")
+        raise UsageError(
+            f"There is no way to colour called '{color}'.", hint=f"Allowed: {', '.join(COLORS)}.", where="--color"
+        )
     return replace(
         settings,
         ascii=settings.ascii or ascii,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -38,7 +39,7 @@ DIFF, APPLY, DOUBTS = "diff", "apply", "doubts"
 def _not_a_file(typed: str) -> str:
     """What is wrong with the name of a configuration file; empty where nothing is."""
     path = as_path(typed.rpartition("=")[2])
-    return "" if path.is_file() else "There is no such file."
+    return "" if os.path.isfile(path) else "There is no such file."
 
 
 class DiffPage(DiagnosisPage):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import ClassVar
 
@@ -53,9 +54,9 @@ class ExportDialog(ModalScreen[str | None]):
         format = format_of(path)
         if format is None:
             self._say(UsageError(f"The file name must end in {suffixes_text()}."))
-        elif path.is_dir():
+        elif os.path.isdir(path):
             self._say(UsageError("This is a folder.", hint="Name a file in it."))
-        elif not path.exists() or await self.app.push_screen_wait(_replacing(path)):
+        elif not os.path.exists(path) or await self.app.push_screen_wait(_replacing(path)):
             error = await self._write(path, format).wait()
             if error is None:
                 self.dismiss(str(path.absolute()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import ClassVar
 
@@ -83,10 +84,10 @@ class OpenLogDialog(ModalScreen[Path | None]):
         event.stop()
         typed = as_path(event.value)
         index = self.query_one(Choices).index
-        path = typed if typed.is_file() or index is None else self._entries[index]
-        if path.is_file() or is_openable(path):
+        path = typed if os.path.isfile(typed) or index is None else self._entries[index]
+        if os.path.isfile(path) or is_openable(path):
             self.dismiss(path)
-        elif path.is_dir():
+        elif os.path.isdir(path):
             self._put(path)
         else:
             self.query_one(".error", Static).update(Content.styled("! There is no such file.", "bold $text-error"))

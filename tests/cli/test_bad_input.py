@@ -195,3 +195,69 @@ def test_a_name_that_no_file_can_have_is_said_to_be_one(care: Care, words: tuple
     ended = care(*words)
     assert ended.code == 2
     assert "longer than names of files can be. Check the path." in ended.stderr
+
+
+@pytest.fixture
+def closed(log: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The log as it is for a user who may not read it, whoever runs the tests."""
+    may, reads = os.access, os.open
+
+    def opened(path: str | Path, flags: int, *more: int, **others: int) -> int:
+        if Path(path) == log and not flags & os.O_WRONLY:
+            raise PermissionError(13, "Permission denied", str(path))
+        return reads(path, flags, *more, **others)
+
+    def access(path: str | Path, mode: int, **others: bool) -> bool:
+        return not (Path(path) == log and mode & os.R_OK) and may(path, mode, **others)
+
+    monkeypatch.setattr(os, "open", opened)
+    monkeypatch.setattr(os, "access", access)
+    return log
+
+
+@pytest.mark.parametrize("words", [["triage"], ["inspect"], [], ["triage", GOOD, "--since"], ["bundle"]])
+def test_a_log_that_may_not_be_read_is_said_to_be(care: Care, closed: Path, words: list[str]) -> None:
+    refused(care, 4, f"{closed}: No permission to read the file. Check its owner and mode.", *words, closed)
+
+
+def test_a_log_of_a_folder_that_may_not_be_read_is_a_line_of_it(care: Care, closed: Path) -> None:
+    shutil.copy(GOOD, closed.parent / "good.BIN")
+    outcome = care("triage", closed.parent, "--no-history")
+    assert outcome.code == 4
+    assert "UNREADABLE     No permission to read the file." in outcome.stdout
+    assert "good.BIN" in outcome.stdout
+
+
+def test_a_log_in_a_folder_that_is_closed_is_said_to_be(care: Care, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    looks = os.stat
+
+    def stat(path: object, *more: object, **others: object) -> object:
+        if str(path) == str(log):
+            raise PermissionError(13, "Permission denied", str(path))
+        return looks(path, *more, **others)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(os, "stat", stat)
+    refused(care, 4, f"{log}: No permission to look there.", "triage", log)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["-v"], "There is no option '-v'. Did you mean '--version'?"),
+        (["--helpp"], "There is no option '--helpp'. Did you mean '--help'?"),
+        (["--versoin"], "There is no option '--versoin'. Did you mean '--version'?"),
+        (["triage", "--jsn"], "There is no option '--jsn'. Did you mean '--json'?"),
+        (["-q"], "There is no option '-q'. 'care --help' lists what there is."),
+        (["compare", "a"], "Missing argument 'B'. 'care compare --help' lists what there is."),
+        (["profiles", "show", "--xyz"], "'care profiles show --help' lists what there is."),
+    ],
+)
+def test_a_command_line_that_cannot_be_taken_is_told_in_a_sentence(care: Care, words: list[str], says: str) -> None:
+    refused(care, 2, says, *words)
+
+
+@pytest.mark.parametrize("word", ["-h", "--help"])
+def test_the_help_of_the_program_is_under_both_names(care: Care, word: str) -> None:
+    outcome = care(word)
+    assert (outcome.code, outcome.stderr) == (0, "")
+    assert outcome.stdout.startswith("Usage: care [OPTIONS] COMMAND")
