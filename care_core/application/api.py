@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, choose, fitting, open_case, read_case
-from care_core.errors import CareError, LogError, UsageError
+from care_core.errors import CareError, LogError, ProfileError, UsageError
 from care_core.records import replace
 
 if TYPE_CHECKING:
@@ -119,7 +119,13 @@ def verify(
     promise = promise_of(promised, chosen.schema, path)
     case = open_case(replace(asked, profile=str(chosen.path)), _silent)
     if case.reading is None and case.log is not None:
-        fitting(case.log, str(chosen.path))  # a run without a mission is compared, one of another robot is not
+        try:  # a run without a mission is compared, one of another robot is not
+            fitting(case.log, str(chosen.path))
+        except ProfileError as err:
+            if asked.profile:
+                raise
+            hint = f"The report is of profile '{chosen.schema.name}': give a later log of the robot that it is of."
+            raise ProfileError(err.message, hint=hint, where=err.where) from err
     schema = chosen.schema if case.reading is None else case.reading.profile.schema
     verification = hold_against(promise, case.diagnosis, schema, asked.thresholds)
     return verify_document(promised, case.diagnosis.run, verification)

@@ -142,11 +142,11 @@ def verdict(judged: Judged, findings: Sequence[Finding] = ()) -> MissionVerdict:
 
 
 def with_repeats(first: Judged, others: Sequence[Judged]) -> Judged:
-    """A run and others that repeat it. Raises NoRepeatsError, and UsageError for a log that is given twice."""
+    """A run and others that repeat it. Raises NoRepeatsError, also for a recording that is given twice."""
     seen = {first.run.log.identity}
     for other in others:
         if other.run.log.identity in seen:
-            raise UsageError("The same log is no repeat.", hint="Name it once.", where=other.run.log.path)
+            raise NoRepeatsError("The same recording is no repeat.", hint="Name it once.", where=other.run.log.path)
         seen.add(other.run.log.identity)
         for name in sorted(first.run.config.keys() & other.run.config.keys()):
             mine, theirs = first.run.config[name], other.run.config[name]

@@ -322,7 +322,8 @@ def _failed(
         if len(unknown) == len(objectives) and len({_CLAUSE.split(one)[0] for one in reasons}) == 1:
             return reason
         names = ", ".join(one.name for one in unknown)
-        return f"no fault found, but {names} could not be evaluated{': ' if reason else ''}{reason}"
+        # The reason first: of a long list of names a narrow line shows the beginning alone.
+        return f"{reason}{'; ' if reason else ''}{names} could not be evaluated, no fault was found"
     if status == "not_evaluated":
         return "nothing that could be judged failed" if fit == "no" else "nothing could be judged"
     part = next(filter(_is_broken_part, findings), None)

@@ -264,14 +264,14 @@ def _verdict(
     diagnosis: Diagnosis,
     doubt: str,
 ) -> tuple[VerifyVerdict, str]:
-    unmade = [change.option.name for change in changes if change.made in ("not_made", "other_value")]
+    unmade = " and ".join(_unmade(changes))
     unseen = [change.option.name for change in changes if change.made == "unknown"]
     severities = {finding.severity for finding in diagnosis.health.findings}
     status = status_of({check.after.status for check in checks}, severities, diagnosis.profile.fit.verdict)
     if doubt == SAME_LOG:
         return "cannot_tell", f"Cannot tell: {doubt}."
     if status == "fault" and unmade:
-        return "change_not_made", f"The change was not made ({', '.join(unmade)}), and {_lost(checks, diagnosis)}."
+        return "change_not_made", f"{unmade[:1].upper()}{unmade[1:]}, and {_lost(checks, diagnosis)}."
     if status == "fault":
         unsure = f"; whether {', '.join(unseen)} was changed is not in the log" if unseen else ""
         return "not_fixed", f"Not fixed: {_lost(checks, diagnosis)}{unsure}."
@@ -300,11 +300,21 @@ def _untold(checks: Sequence[ObjectiveCheck], diagnosis: Diagnosis) -> str:
     return f"{names} could not be evaluated ({unknown[0].after.reason})"
 
 
+def _unmade(changes: Sequence[MadeChange]) -> Iterator[str]:
+    """In clauses, what of the promised changes was not made, and of what another value was driven."""
+    if kept := [change.option.name for change in changes if change.made == "not_made"]:
+        yield f"the change was not made ({', '.join(kept)})"
+    others = [change for change in changes if change.made == "other_value"]
+    if told := [f"{one.option.name} {one.option.show(one.driven)} instead of {one.option.show(one.wanted)}"
+                for one in others]:  # fmt: skip
+        yield f"another value was driven than promised ({', '.join(told)})"
+
+
 def _although(
-    unmade: Sequence[str], unseen: Sequence[str], others: Sequence[OtherChange], checks: Sequence[ObjectiveCheck]
+    unmade: str, unseen: Sequence[str], others: Sequence[OtherChange], checks: Sequence[ObjectiveCheck]
 ) -> Iterator[str]:
     if unmade:
-        yield f"the change was not made ({', '.join(unmade)})"
+        yield unmade
     if unseen:
         yield f"the log does not show whether {', '.join(unseen)} was changed"
     if others:

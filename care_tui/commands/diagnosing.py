@@ -159,9 +159,10 @@ def _each(request: Request, *, no_history: bool) -> list[Answered]:
     answers = []
     with Progress() as progress:
         for log in (request.log, *request.repeats):
-            answers.append(answer_of(replace(request, log=log, repeats=()), progress))
+            own = replace(request, log=log, repeats=())
+            answers.append(answer_of(own, progress))
             if (case := answers[-1].case) is not None and not no_history:
-                mention(remember_triage(case.diagnosis, request))
+                mention(remember_triage(case.diagnosis, own))
     return answers
 
 

@@ -89,3 +89,26 @@ def test_a_name_of_a_log_cannot_steer_the_terminal(care: Care, tmp_path: Path) -
     outcome = care("triage", strange, MOTOR)
     assert "\x1b" not in outcome.stdout
     assert len(outcome.stdout.splitlines()) == 2
+
+
+def test_a_log_and_its_cut_copy_are_triaged_each_by_itself(care: Care, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.BIN"
+    cut.write_bytes(FAILED.read_bytes()[:250_000])
+    outcome = care("triage", FAILED, cut)
+    assert outcome.code == 1
+    assert verdicts(outcome.stdout) == [("FAULT", "arducopter_failed.BIN"), ("NOT EVALUATED", "cut.BIN")]
+    assert "The same recording is no repeat. Each is triaged by itself." in outcome.stderr
+    path = history_path()
+    assert path is not None
+    assert {one.terms for one in History(path).triages()} == {""}, "each is remembered as judged by itself"
+    as_json = care("triage", FAILED, cut, "--json")
+    assert (as_json.code, "Name it once." in as_json.stderr) == (2, True)
+
+
+def test_a_report_of_another_vehicle_is_said_to_be(care: Care, tmp_path: Path) -> None:
+    report = tmp_path / "report.yaml"
+    care("triage", FAILED, "--out", report)
+    outcome = care("verify", report, bundled("samples", "ardurover_failed.BIN"))
+    assert outcome.code == 2
+    assert "The report is of profile 'arducopter': give a later log of the robot that it is of." in outcome.stderr
+    assert "--profile" not in outcome.stderr

@@ -66,5 +66,5 @@ def test_another_configuration_and_the_same_log_are_no_repeats(planted: Profile)
     first = judged(planted, "a", outcome(260.0), reserve=40.0)
     with pytest.raises(UsageError, match="reserve was 40, then 50"):
         with_repeats(first, [judged(planted, "b", outcome(260.0), reserve=50.0)])
-    with pytest.raises(UsageError, match="same log"):
+    with pytest.raises(UsageError, match="same recording"):
         with_repeats(first, [first])

@@ -90,6 +90,8 @@ def test_another_value_is_neither_made_nor_left() -> None:
     assert found.changes[0].made == "other_value"
     assert found.changes[0].driven == 2.5
     assert found.verdict == "change_not_made"
+    assert found.sentence.startswith("Another value was driven than promised (speed 2.5 instead of 5), and ")
+    assert "was not made" not in found.sentence
 
 
 def test_a_change_that_did_not_help() -> None:
