@@ -149,6 +149,19 @@ def _recent_file() -> Path:
     return user_state_path("care") / "recent-logs"
 
 
+def short(folder: Path) -> str:
+    """A folder as the operator says it: from here, or from home."""
+    for start, name in ((Path.cwd(), ""), (Path.home(), "~/")):
+        if folder.is_relative_to(start):
+            return f"{name}{folder.relative_to(start)}"
+    return str(folder)
+
+
+def named(places: Iterable[Path]) -> str:
+    """Folders as an answer names them where nothing was found in them."""
+    return ", ".join("this folder" if place == Path() else short(place) for place in places)
+
+
 def as_path(typed: str) -> Path:
     """The path that was typed, pasted, or dropped on the terminal (quoted, escaped, or as a file: address)."""
     typed = typed.strip()

@@ -25,7 +25,7 @@ from care_tui.commands.arguments import (
     bounds,
 )
 from care_tui.console import say
-from care_tui.places import files_of, is_openable, logs_in, written_s
+from care_tui.places import files_of, is_openable, logs_in, named, written_s
 
 app = typer.Typer()
 
@@ -108,9 +108,10 @@ def newest_named() -> Path:
     """The newest log of the usual places, which is said. Raises UsageError where there is none."""
     from care_tui.settings import load_settings
 
-    found = newest_log(load_settings(None).places)
+    places = load_settings(None).places
+    found = newest_log(places)
     if found is None:
-        raise UsageError("There is no log in the usual places.", hint="Name one.")
+        raise UsageError("There is no log in the usual places.", hint=f"Name one; looked in {named(places)}.")
     say(f"the newest log is {found}")
     return found
 

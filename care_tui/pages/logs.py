@@ -24,7 +24,7 @@ from care_core.text import clean
 from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Judge, OpenLog
 from care_tui.pages.page import Page, View, enter_to
-from care_tui.places import LogFile, found_logs
+from care_tui.places import LogFile, found_logs, named, short
 from care_tui.render.rows import Row, Rows, by_options, error_rows, labelled, shortened, status, text
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.session import Session
@@ -209,8 +209,8 @@ class LogsPage(Page):
             return error_rows(found)
         if found is None:
             return Rows([Row(Content("Looking for logs..."))])
-        looked = ", ".join(str(place) for place in self.workspace.places)
-        return Rows([labelled("No log", f"none was found in {looked}"), labelled("What to do", "press o and name one")])
+        nothing = f"none was found in {named(self.workspace.places)}"
+        return Rows([labelled("No log", nothing), labelled("What to do", "press o and name one")])
 
     def _about(self, log: LogFile) -> Iterator[Row]:
         known = self._known.get(log.path)
@@ -267,14 +267,6 @@ def age(seconds: float) -> str:
         if seconds >= length:
             return f"{seconds // length:.0f} {unit} ago"
     return "just now"
-
-
-def short(folder: Path) -> str:
-    """A folder as the operator says it: from here, or from home."""
-    for start, name in ((Path.cwd(), ""), (Path.home(), "~/")):
-        if folder.is_relative_to(start):
-            return f"{name}{folder.relative_to(start)}"
-    return str(folder)
 
 
 def size(count: int) -> str:

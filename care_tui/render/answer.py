@@ -27,7 +27,7 @@ def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) 
     if session.state == "empty":
         return [
             Content.styled("No log is open", "bold"),
-            Content("L lists the logs that there are: Enter opens one, o any other"),
+            Content("Enter opens one of the list of logs (L), o any other"),
         ]
     if session.state == "error" and session.error is not None:
         return [

@@ -68,4 +68,5 @@ def test_where_there_is_no_log_triage_asks_for_one(care: Care, tmp_path: Path, m
     monkeypatch.setattr("care_tui.commands.opening.logs_in", lambda _: iter(()))
     outcome = care("triage")
     assert outcome.code == 2
-    assert "There is no log in the usual places. Name one." in outcome.stderr
+    assert "There is no log in the usual places. Name one; looked in this folder, logs, " in outcome.stderr
+    assert "Mission Planner/logs" in outcome.stderr
