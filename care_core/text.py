@@ -57,8 +57,16 @@ def command(*words: str, note: str = "") -> str:
 
 
 def shortened(text: str, longest: int) -> str:
-    """The text, or as much of its beginning with a sign that it goes on."""
-    return text if len(text) <= longest else f"{text[: longest - 3].rstrip()}..."
+    """The text, or as much of its beginning with a sign that it goes on; no word is cut but one that is very long."""
+    if len(text) <= longest:
+        return text
+    head = text[: longest - 2].rpartition(" ")[0]
+    return f"{head if len(head) > longest / 2 else text[: longest - 3].rstrip()}..."
+
+
+def number_of(count: int, noun: str) -> str:
+    """So many of something: 1 log, 2 logs."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:

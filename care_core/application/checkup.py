@@ -14,6 +14,7 @@ from typing import Literal
 from care_core.errors import CareError
 from care_core.extras import DISTRIBUTION, EXTRAS, install_command
 from care_core.records import Record
+from care_core.text import number_of
 
 Status = Literal["ok", "warn", "fail"]
 
@@ -183,4 +184,4 @@ def _history() -> Checked:
         count = len(History(path).triages())
     except CareError as err:
         return Checked("history", "fail", err.message, err.hint)
-    return Checked("history", "ok", f"{count} runs in {path}")
+    return Checked("history", "ok", f"{number_of(count, 'run')} in {path}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from care_core.errors import ConfigError, UsageError
 from care_core.files import open_regular
 from care_core.run import Setting
-from care_core.text import clean
+from care_core.text import clean, number_of
 
 if TYPE_CHECKING:
     from care_core.application.case import Case
@@ -179,7 +179,7 @@ def diff_of(case: Case, fix: Fix, side: DiffSide) -> str:
     from care_core.configs.changes import unified_diff
 
     if side == "driven":
-        return unified_diff(case.diagnosis.run, fix)
+        return unified_diff(case.diagnosis.run, fix.changes, by_hand=fix.by_hand)
     if side == "file":
         return patch_of(edited_by(case, fix))
     return _file_against_driven(case)
@@ -214,7 +214,9 @@ def doubts_of(case: Case, fix: Fix) -> tuple[str, ...]:
     ]
     others = len(_file_against_driven(case).splitlines())
     if others:
-        notes.append(f"{others} parameters of the file are not what the robot ran")
+        notes.append(
+            f"{number_of(others, 'parameter')} of the file {'is' if others == 1 else 'are'} not what the robot ran"
+        )
     return tuple(dict.fromkeys((*_of_other_vehicles(case), *notes)))
 
 

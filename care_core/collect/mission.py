@@ -30,6 +30,7 @@ from care_core.records import Record
 from care_core.run import Setting
 from care_core.starting import script_command
 from care_core.tables.rows import TableRow, rows_of
+from care_core.text import shortened
 
 RUNS = "runs"
 RECORD, OUTPUT, LOGS = "ended.json", "command.log", "logs"
@@ -228,7 +229,7 @@ def _last_words(output: Path) -> str:
         stream.seek(max(0, output.stat().st_size - 4096))
         lines = stream.read().decode("utf-8", "replace").split("\n")
     said = [line.strip() for line in lines if line.strip()]
-    return f": {said[-1][:_TOLD]}" if said else ""
+    return f": {shortened(said[-1], _TOLD)}" if said else ""
 
 
 def _read(campaign: Campaign, run: Planned, folder: Path, attempts: int, time_s: float) -> Done:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 from care_core.configs.driven import option_value, parameter_value, readable
 from care_core.configs.formats import format_for
@@ -13,16 +12,17 @@ from care_core.run import Run
 from care_core.text import clean
 from care_core.variables import Change, Variable
 
-if TYPE_CHECKING:
-    from care_core.diagnose.records import Fix
 
+def unified_diff(run: Run, changes: Sequence[Change], *, by_hand: bool = False) -> str:
+    """The configuration as driven against the changes, in the ecosystem's own format; only keys that change.
 
-def unified_diff(run: Run, fix: Fix) -> str:
-    """The configuration as driven against a fix, in the ecosystem's own format; only keys that change."""
+    Args:
+        by_hand: the operator chose them.
+    """
     line_of = format_for(run.log.format, run.settings).functions.line_of
     driven, fixed = {}, {}
-    for option, parameter, suggested in _assignments(fix.changes):
-        change = next(change for change in fix.changes if change.option is option)
+    for option, parameter, suggested in _assignments(changes):
+        change = next(change for change in changes if change.option is option)
         setting = run.settings.get(parameter)
         current = None if setting is None else option_value(option, setting)
         was = change.current if current is None else current
@@ -33,7 +33,7 @@ def unified_diff(run: Run, fix: Fix) -> str:
         [driven[parameter] for parameter in sorted(driven)],
         [fixed[parameter] for parameter in sorted(fixed)],
         fromfile="as driven",
-        tofile="chosen by hand" if fix.by_hand else "suggested",
+        tofile="chosen by hand" if by_hand else "suggested",
         n=0,
         lineterm="",
     )

@@ -7,7 +7,7 @@ from typing import Any, Final, Literal
 
 from care_core.records import field
 from care_core.report.published import Document
-from care_core.text import clean, wrapped
+from care_core.text import clean, number_of, wrapped
 
 SCHEMA_ID: Final = "care.collect/1"
 
@@ -102,7 +102,7 @@ def _lines(document: CollectDocument) -> Iterator[Sequence[str]]:
     ignored = sorted({name for run in document.runs for name in run.ignored})
     if ignored:
         count = sum(bool(run.ignored) for run in document.runs)
-        told = f"{', '.join(ignored)}: not driven as asked in {count} runs; the table has what was driven"
+        told = f"{', '.join(ignored)}: not driven as asked in {number_of(count, 'run')}; the table has what was driven"
         yield tuple(wrapped(told, "Ignored   ", "          "))
     for reason in [reason for run in document.runs for reason in run.unread][:_MOST_FAILURES]:
         yield tuple(wrapped(clean(reason), "Unread    ", "          "))

@@ -368,7 +368,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
         headline=verdict.headline,
         next_step=verdict.next_step,
         verdict=verdict,
-        diff="" if fix is None else unified_diff(run, fix),
+        diff="" if fix is None else unified_diff(run, fix.changes, by_hand=fix.by_hand),
         apply=[] if fix is None else apply_commands(fix.changes, format_for(log.format, run.settings)),
     )
 

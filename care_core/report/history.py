@@ -15,7 +15,7 @@ from care_core.report.document import leading_cause, remembered_verdict
 from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import remembered
 from care_core.run import FitVerdict, Robot
-from care_core.text import clean, percent, wrapped
+from care_core.text import clean, number_of, percent, wrapped
 
 SCHEMA_ID: Final = "care.history/1"
 _SPARKS = 24
@@ -217,7 +217,7 @@ def _lines(document: HistoryDocument, ascii: bool, everything: bool) -> Iterator
     for robot in told:
         yield ""
         yield from _robot_lines(robot, ascii, everything)
-    thin = [f"{_name(robot)} ({_count(robot.runs, 'run')})" for robot in document.robots if robot not in told]
+    thin = [f"{_name(robot)} ({number_of(robot.runs, 'run')})" for robot in document.robots if robot not in told]
     if thin:
         yield ""
         yield from wrapped(f"Fewer than the {LEAST_RUNS} runs of a trend ({_ALL}): {', '.join(thin)}", rest="  ")
@@ -247,28 +247,24 @@ def _robot_lines(robot: RobotRunsEntry, ascii: bool, everything: bool) -> Iterat
     is_shared = robot.robot is not None and (not robot.robot.is_sure or robot.robot.is_simulated)
     doubt = ", others may share it" if is_shared else ""
     faulty = "none" if not robot.faulty else f"{robot.faulty} of them"
-    yield from wrapped(f"{name} ({source}{doubt}): {_count(robot.runs, 'run')}, {faulty} with a fault")
+    yield from wrapped(f"{name} ({source}{doubt}): {number_of(robot.runs, 'run')}, {faulty} with a fault")
     missions = [(n, one) for n, one in enumerate(robot.missions, 1) if everything or not _is_thin(one.trends)]
     width = max(len(trend.objective) for trend in (robot.faults, *(t for _, one in missions for t in one.trends)))
     yield from _trend_lines(robot.faults, "  ", width + 2, ascii)
     for number, mission in missions:
         judged = f"by {mission.profile}" if mission.profile else "without a profile"
-        yield clean(f"  mission {number}: {_count(mission.runs, 'run')} judged {judged}")
+        yield clean(f"  mission {number}: {number_of(mission.runs, 'run')} judged {judged}")
         for trend in mission.trends:
             yield from _trend_lines(trend, "    ", width, ascii)
     if thin := len(robot.missions) - len(missions):
-        yield f"  {_count(thin, 'mission')} with fewer than the {LEAST_RUNS} runs of a trend ({_ALL})"
-
-
-def _count(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+        yield f"  {number_of(thin, 'mission')} with fewer than the {LEAST_RUNS} runs of a trend ({_ALL})"
 
 
 def _trend_lines(trend: TrendEntry, indent: str, width: int, ascii: bool) -> Iterator[str]:
     values = trend.values
     span = "" if not values else f", {_span(min(values), max(values), trend.unit)}"
     said = {
-        "too few": f"{_count(len(values), 'value')}{span}: needs {LEAST_RUNS} runs to show a trend",
+        "too few": f"{number_of(len(values), 'value')}{span}: needs {LEAST_RUNS} runs to show a trend",
         "constant": f"always {_figure(values[0], trend.unit)}" if values else "",
         "none": f"no trend{span}",
         "worse": f"GETS WORSE{span}",

@@ -11,7 +11,7 @@ from care_core.files import read_small_text
 from care_core.history.store import SWITCH, HistoryError
 from care_core.records import UnfitError, read
 from care_core.report.document import SCHEMA_ID, ProfileEntry, TriageDocument
-from care_core.text import clean
+from care_core.text import clean, shortened
 
 
 def read_report(path: str | Path) -> TriageDocument:
@@ -76,7 +76,7 @@ def _load(path: Path) -> Any:
         if path.suffix.casefold() not in (".yaml", ".yml", ".json"):
             hint = "Give the one in YAML or JSON: 'care triage LOG --out report.yaml' writes it."
             raise ConfigError("A report in this format is for people to read.", hint=hint, where=str(path)) from err
-        detail = " ".join(str(err).split())[:120]
+        detail = shortened(" ".join(str(err).split()), 120)
         raise ConfigError(f"The report cannot be read: {detail}.", hint="Write it again.", where=str(path)) from err
 
 

@@ -22,7 +22,7 @@ from care_core.profile.store import Profile, installed_profile
 from care_core.records import Record, replace
 from care_core.report.document import ChangeEntry, FixEntry, FixSet, TriageDocument
 from care_core.report.reading import profile_of
-from care_core.text import clean
+from care_core.text import clean, shortened
 from care_core.variables import Variable, is_parameter_name
 
 _KINDS: tuple[Kind, ...] = ("copter", "quadplane", "rover")
@@ -117,7 +117,7 @@ def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str, roles:
     named = (change.parameter,) if isinstance(change.parameter, str) else tuple(change.parameter)
     driven = _under(option, named, schema)
     if driven is None:
-        shown = ", ".join(map(clean, named))[:80]
+        shown = shortened(", ".join(map(clean, named)), 80)
         own = ", ".join(option.parameters)
         raise _strange(f"the change of {option.name} may set {own} alone, not {shown}", path, f"{key}.parameter")
     before, value = float(change.from_) / driven.scale, float(change.to) / driven.scale

@@ -171,7 +171,8 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         likely = promise(other.odds, as_driven, other.is_guess)
         yield from wrapped(f"or {', '.join(map(str, other.changes))}: {likely}", "  ", "     ")
     yield ""
-    yield from (f"  {line}" for line in unified_diff(diagnosis.run, fix).splitlines())
+    diff = unified_diff(diagnosis.run, fix.changes, by_hand=fix.by_hand)
+    yield from (f"  {line}" for line in diff.splitlines())
     yield ""
     yield from (
         f"  {line}"

@@ -13,7 +13,7 @@ from mcp.server.mcpserver.exceptions import ToolError
 from mcp.types import ToolAnnotations
 
 from care_core.errors import CareError
-from care_core.text import clean
+from care_core.text import clean, shortened
 from care_tui import __version__
 from care_tui.assistant.answers import framed
 from care_tui.assistant.tools import Tools
@@ -58,6 +58,6 @@ def _sentence_of_errors(tool: Callable[..., str]) -> Callable[..., str]:
         try:
             return tool(*args, **named)
         except CareError as err:
-            raise ToolError(framed(clean(str(err))[:_MOST_CHARACTERS])) from None
+            raise ToolError(framed(shortened(clean(str(err)), _MOST_CHARACTERS))) from None
 
     return safe

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.errors import ExitCode, LogError
+from care_core.text import number_of
 from care_tui.commands.arguments import AsJson, Force, LogPath, Out, ProfileName
 from care_tui.console import Progress, check_writable, emit, say
 
@@ -112,8 +113,8 @@ def ingest(
         raise LogError(f"None of the {len(paths)} logs could be read.", hint="Look at one with 'care inspect'.")
     write_table(out, found.rows, schema)
     journal.unlink(missing_ok=True)
-    read = len(paths) - len(found.failures)
-    say(f"wrote {out}: {len(found.rows)} runs of {read} logs, {len(found.failures)} logs failed")
+    runs, failed = number_of(len(found.rows), "run"), number_of(len(found.failures), "log")
+    say(f"wrote {out}: {runs} of {number_of(len(paths) - len(found.failures), 'log')}, {failed} failed")
     raise typer.Exit(ExitCode.NOT_EVALUATED if found.failures else ExitCode.OK)
 
 

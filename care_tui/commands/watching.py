@@ -18,6 +18,7 @@ import typer
 
 from care_core.errors import ExitCode, UsageError
 from care_core.records import Struct, field
+from care_core.text import number_of
 from care_tui.commands.arguments import ProfileName, RobotName, Site, Thresholds, bounds
 from care_tui.commands.past import NoHistory
 from care_tui.console import emit, painted, say
@@ -66,8 +67,9 @@ def watch(
 ) -> None:
     """Wait for finished logs and triage each once. Prints a line a log; ends with 130 on Ctrl+C.
 
-    With --once it ends with 1 where a fault was found, 4 where a log could not be read, 3 where one could not be judged
-    or is not finished, else 0.
+    A log that is in the history already, judged by the same options, is counted and not judged again (--no-history
+    judges all). With --once it ends with 1 where a fault was found, 4 where a log could not be read, 3 where one could
+    not be judged or is not finished, else 0: also where all were known before, whatever their verdicts.
     """
     from care_core.application.notifying import parse_notifier
     from care_core.application.watching import Task, Watcher, overall_code
@@ -210,7 +212,7 @@ class _Screen(Struct, eq=False, dict=True):
     def _waited_for(self, watcher: Watcher) -> str:
         from care_core.text import clean
 
-        known = f"{watcher.known} logs were done before; " if watcher.known and not self.entries else ""
+        known = f"{_done_before(watcher)}; " if watcher.known and not self.entries else ""
         if not watcher.waiting:
             return f"{known}waiting for logs"
         first = watcher.waiting[0]
@@ -228,12 +230,12 @@ class _Screen(Struct, eq=False, dict=True):
         for sight in watcher.waiting:
             say(f"{sight.path}: not finished: {sight.open_by or 'it is still being written'}")
         if watcher.known:
-            say(f"{watcher.known} logs were done before")
+            say(_done_before(watcher))
 
     def end(self) -> None:
         self._clear()
         faults = sum(entry.verdict == "fault" for entry in self.entries)
-        say(f"{len(self.entries)} logs, {faults} with a fault")
+        say(f"{number_of(len(self.entries), 'log')}, {faults} with a fault")
 
     def wait(self, pause_s: float) -> None:
         """Wait, open what the operator asks for, and show what was held when the app is closed."""
@@ -284,3 +286,7 @@ def _is_in_front() -> bool:
         return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
     except OSError:
         return False
+
+
+def _done_before(watcher: Watcher) -> str:
+    return f"{number_of(watcher.known, 'log')} {'was' if watcher.known == 1 else 'were'} done before"

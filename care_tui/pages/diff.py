@@ -15,7 +15,7 @@ from care_core.application.configuring import DiffSide
 from care_core.diagnose.records import Fix, helps
 from care_core.errors import CareError
 from care_core.records import replace
-from care_core.text import clean
+from care_core.text import clean, number_of
 from care_tui.copying import copy
 from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to, sentence
@@ -167,7 +167,7 @@ class DiffPage(DiagnosisPage):
             return
         files = ", ".join(str(name) for name in case.configs)
         odds = "" if fix.odds is None else f" With {percent(fix.odds)} probability the next run then has no fault."
-        question = f"Put {len(fix.changes)} change{'s' if len(fix.changes) > 1 else ''} into {files}?{odds}"
+        question = f"Put {number_of(len(fix.changes), 'change')} into {files}?{odds}"
         keys = "y writes it and keeps the old one as .bak, n or Esc leaves it"
         self.app.push_screen(Confirm(question, keys, [*doubts, *self._cautions(fix)]), self._confirmed)
 

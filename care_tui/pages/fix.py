@@ -9,7 +9,7 @@ from textual.content import Content
 
 from care_core.application.case import changes_of, fixes
 from care_core.diagnose.records import Fix
-from care_core.text import clean
+from care_core.text import clean, number_of
 from care_core.variables import Variable
 from care_tui.basket import nudged, parsed, possible
 from care_tui.messages import Decided
@@ -82,7 +82,7 @@ class FixPage(DiagnosisPage):
         if self.session.fix_error is not None:
             return Content("No prediction")
         count = len(self.session.basket.ticked)
-        ticked = f"{count} change{'' if count == 1 else 's'} ticked" if count else "nothing ticked"
+        ticked = f"{number_of(count, 'change')} ticked" if count else "nothing ticked"
         return Content(f"What to change: {ticked}")
 
     def _detail(self, option: Variable | None) -> Rows:

@@ -13,10 +13,21 @@ from care_core.application.case import Request
 from care_core.application.viewing import Past, past_runs
 from care_core.diagnose.verdict import fit_words
 from care_core.errors import CareError
-from care_core.text import clean
+from care_core.text import clean, number_of
 from care_tui.messages import OpenLog
 from care_tui.pages.page import OPEN, Page, View, enter_to, sentence, view_of
-from care_tui.render.rows import ASCII, Row, Rows, by_options, error_rows, labelled, padded, plain_rows, shortened, text
+from care_tui.render.rows import (
+    ASCII,
+    Row,
+    Rows,
+    by_options,
+    error_rows,
+    labelled,
+    padded,
+    plain_rows,
+    text,
+    without_middle,
+)
 from care_tui.widgets.choices import Listing
 
 NAME_WIDTH, VALUE_WIDTH, LOG_WIDTH = 18, 16, 26
@@ -60,8 +71,7 @@ class HistoryPage(Page):
             lambda i, _width: (self._item(runs[i]),),
             lambda i: f"{runs[i].log} {runs[i].profile} {runs[i].verdict} {runs[i].cause}",
         )
-        count = f"{len(runs)} run{'' if len(runs) == 1 else 's'}"
-        title = Content(f"{count}; x marks one to compare with")
+        title = Content(f"{number_of(len(runs), 'run')}; x marks one to compare with")
         if self._marked is not None:
             title = Content(f"Compared with {_named(self._marked)}; Enter: both in full; x again unmarks")
         return View(title, lambda i: Rows([]) if i is None else self._beside(runs[i], i, runs), listing)
@@ -83,7 +93,7 @@ class HistoryPage(Page):
         mark = "*" if past == self._marked else " "
         line = Content(f"{mark} {past.at[:16].replace('T', ' ')}  ")
         fit = "" if past.fit == "fits" else f"  ({fit_words(past.profile, past.fit).removeprefix('Profile ')})"
-        name = shortened(_named(past), LOG_WIDTH, self.glyphs)
+        name = without_middle(_named(past), LOG_WIDTH, self.glyphs)
         told = f" {by_options(past.judged_with)}{past.verdict}"
         return line + padded(name, LOG_WIDTH, "bold") + text(told) + text(fit, "dim")
 
@@ -101,7 +111,7 @@ class HistoryPage(Page):
         if past.cause:
             rows.append(labelled("Cause", past.cause))
         until = [run for run in reversed(runs[index:]) if run.profile == past.profile]
-        up_to_it = f"{len(until)} run{'' if len(until) == 1 else 's'} up to it"
+        up_to_it = f"{number_of(len(until), 'run')} up to it"
         rows += [Row(Content()), _columns("Objective", "this run", up_to_it, "bold")]
         for name, value in past.values.items():
             rows.append(_columns(name, _shown(value), self._trend([run.values.get(name) for run in until])))

@@ -20,12 +20,12 @@ from care_core.application.viewing import known_verdicts
 from care_core.diagnose.verdict import RunStatus, verdict_of
 from care_core.errors import CareError
 from care_core.records import Record
-from care_core.text import clean
+from care_core.text import clean, number_of
 from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Judge, OpenLog
 from care_tui.pages.page import Page, View, enter_to
 from care_tui.places import LogFile, found_logs, named, short
-from care_tui.render.rows import Row, Rows, by_options, error_rows, labelled, shortened, status, text
+from care_tui.render.rows import Row, Rows, by_options, error_rows, labelled, status, text, without_middle
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.session import Session
 from care_tui.widgets.choices import Listing
@@ -154,7 +154,7 @@ class LogsPage(Page):
         opened = self.session.path
         index = places.index(opened) if opened in places and self.choices.index is None else None
         unknown = sum(path not in self._known for path in places) if self.workspace.folder else 0
-        count = f"{len(logs)} log{'' if len(logs) == 1 else 's'}"
+        count = number_of(len(logs), "log")
         more = f", {unknown} still to be judged" if unknown else ""
         where = f" in {clean(short(self.workspace.folder) or '.')}" if self.workspace.folder else ""
         return View(
@@ -168,7 +168,7 @@ class LogsPage(Page):
 
     def _named(self, path: Path) -> Content:
         """The name of a log, with the folders between it and the folder that was named, of which the end tells most."""
-        named = text(shortened(path.name, NAME_WIDTH, self.glyphs), "bold")
+        named = text(without_middle(path.name, NAME_WIDTH, self.glyphs), "bold")
         inside = self.workspace.folder
         between = path.parent.relative_to(inside) if inside and path.is_relative_to(inside) else Path()
         room = NAME_WIDTH - named.cell_length - 1

@@ -10,7 +10,7 @@ from textual.content import Content
 from care_core.application.proof import Subject
 from care_core.application.viewing import messages_of
 from care_core.ecosystems.findings import Event
-from care_core.text import seconds
+from care_core.text import number_of, seconds
 from care_tui.pages.page import Page, View, enter_to, sentence, view_of
 from care_tui.render.objectives import meaning
 from care_tui.render.rows import Row, Rows, labelled, text
@@ -52,7 +52,7 @@ class MessagesPage(Page):
             wanted = self._wanted
             index = min(range(len(messages)), key=lambda i: abs(messages[i].time_s - wanted))
         self._placed, self._wanted = True, None
-        title = Content(f"{len(messages)} messages{self._span()}")
+        title = Content(f"{number_of(len(messages), 'message')}{self._span()}")
         return View(title, lambda i: self._detail(None if i is None else messages[i]), listing, index)
 
     def look_at(self, moment_s: float | None, subject: Subject | None) -> None:

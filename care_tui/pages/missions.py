@@ -9,7 +9,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, MissionVerdict
 from care_core.records import replace
-from care_core.text import seconds
+from care_core.text import number_of, seconds
 from care_tui.messages import Judge
 from care_tui.pages.page import Page, View, enter_to, sentence
 from care_tui.render.objectives import objective_item
@@ -33,7 +33,7 @@ class MissionsPage(Page):
         if not missions:
             none = "No profile fits this log, so no mission is judged."
             return View(Content("Missions"), lambda _: sentence(none))
-        count = f"{len(missions)} {self._diagnosis.run.noun}{'' if len(missions) == 1 else 's'}"
+        count = number_of(len(missions), self._diagnosis.run.noun)
         listing = Listing(
             len(missions),
             lambda i, _width: (self._item(missions[i]),),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from textual.content import Content
 
 from care_core.application.viewing import Installed, installed_profiles
+from care_core.text import number_of
 from care_tui.pages.page import Page, View, sentence, view_of
 from care_tui.render.rows import Row, Rows, padded, plain_rows, text
 from care_tui.widgets.choices import Listing
@@ -22,7 +23,7 @@ class ProfilesPage(Page):
         return view_of("Profiles", self.fetched("profiles", installed_profiles), self._show)
 
     def _show(self, profiles: list[Installed]) -> View:
-        title = Content(f"{len(profiles)} profiles are installed")
+        title = Content(f"{number_of(len(profiles), 'profile')} installed")
         if not profiles:
             return View(title, lambda _: sentence("No profile is installed."))
         names = [profile.name for profile in profiles]

@@ -10,7 +10,7 @@ from textual.content import Content
 
 from care_core.errors import CareError
 from care_core.report.formats import FILE_FORMATS, FORMATS
-from care_core.text import clean
+from care_core.text import clean, number_of
 from care_tui.copying import copy
 from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to, sentence
@@ -87,6 +87,6 @@ class ReportPage(DiagnosisPage):
         """Copy the commands that apply the fix."""
         commands = self.workspace.engine.commands(self.session.decided())
         if commands:
-            self.say(copy(self.app, "\n".join(commands) + "\n", f"{len(commands)} commands", ".commands.sh"))
+            self.say(copy(self.app, "\n".join(commands) + "\n", number_of(len(commands), "command"), ".commands.sh"))
         else:
             self.say("Nothing changes, so there are no commands.")

@@ -169,7 +169,7 @@ def cut(line: Content, width: int, glyphs: Glyphs) -> Content:
     return line if line.cell_length <= width else line.truncate(max(width - 1, 1)) + glyphs.more
 
 
-def shortened(name: str, width: int, glyphs: Glyphs) -> str:
+def without_middle(name: str, width: int, glyphs: Glyphs) -> str:
     """A name where it fits, else without its middle: what tells files of one place apart is at their ends."""
     name = clean(name)
     if cell_len(name) <= width:

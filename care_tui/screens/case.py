@@ -34,7 +34,7 @@ from care_tui.pages.logs import Known, LogsPage
 from care_tui.pages.making import make_page
 from care_tui.pages.page import Page, label_of
 from care_tui.places import remember
-from care_tui.render.rows import shortened
+from care_tui.render.rows import without_middle
 from care_tui.session import Session
 from care_tui.widgets.answer_bar import AnswerBar
 from care_tui.widgets.filter_bar import FilterBar
@@ -183,7 +183,7 @@ class CaseScreen(Screen[None]):
         room = self.app.size.width - STEPS_WIDTH
         name = ""
         if session.path is not None and room >= SHORTEST_NAME:
-            name = shortened(session.path.name, room, self.workspace.glyphs)
+            name = without_middle(session.path.name, room, self.workspace.glyphs)
         shown = self.query_one("#log-name", Static)
         if shown.content != name:
             shown.update(name)

@@ -235,7 +235,7 @@ def test_ingest_chooses_the_profile_by_a_log_that_can_be_read(
     empty.touch()
     outcome = care("ingest", empty, flights[0], "-o", tmp_path / "runs.csv")
     assert outcome.code == 3
-    assert "1 logs failed" in outcome.stderr
+    assert "1 log failed" in outcome.stderr
 
 
 def test_only_one_format_can_be_printed(care: Care, made: dict[str, Any]) -> None:

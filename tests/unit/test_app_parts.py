@@ -19,7 +19,7 @@ from care_core.variables import Role, Variable
 from care_tui.basket import Basket, nudged, parsed, possible
 from care_tui.clipboard import MAX_BYTES, fits, osc52
 from care_tui.render.objectives import objective_detail
-from care_tui.render.rows import UNICODE, shortened
+from care_tui.render.rows import UNICODE, without_middle
 from care_tui.settings import Settings, load_settings, prepare_terminal, takes_only_ascii, with_flags
 from tests.made import made_diagnosis
 from tests.tui import sample_diagnosis as sample
@@ -187,11 +187,11 @@ def test_a_parameter_that_is_set_aside_takes_no_advice_about_another_along() -> 
 
 @pytest.mark.parametrize("name", ["a_very_long_name_of_a_flight_2026-11-20_10-12-13.BIN", "飛行" * 20 + ".BIN"])
 def test_a_long_name_keeps_both_ends(name: str) -> None:
-    told = shortened(name, 26, UNICODE)
+    told = without_middle(name, 26, UNICODE)
     assert cell_len(told) <= 26
     assert told.startswith(name[:3])
     assert told.endswith(".BIN")
-    assert shortened("short.BIN", 26, UNICODE) == "short.BIN"
+    assert without_middle("short.BIN", 26, UNICODE) == "short.BIN"
 
 
 @pytest.mark.parametrize("room", [40, 54, 80])

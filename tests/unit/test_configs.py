@@ -328,10 +328,10 @@ def test_a_remark_stands_by_its_parameter() -> None:
 def test_the_diff_shows_only_what_changes() -> None:
     diagnosis = made_diagnosis()
     assert diagnosis.fix is not None
-    lines = unified_diff(diagnosis.run, diagnosis.fix).splitlines()
+    lines = unified_diff(diagnosis.run, diagnosis.fix.changes).splitlines()
     assert lines[:2] == ["--- as driven", "+++ suggested"]
     assert lines[3:] == ["-LAND_SPEED,16", "+LAND_SPEED,50"]
-    typed = unified_diff(diagnosis.run, replace(diagnosis.fix, by_hand=True)).splitlines()
+    typed = unified_diff(diagnosis.run, diagnosis.fix.changes, by_hand=True).splitlines()
     assert typed[1] == "+++ chosen by hand"
 
 
@@ -339,7 +339,7 @@ def test_a_fix_that_changes_nothing_has_no_diff() -> None:
     diagnosis = made_diagnosis()
     assert diagnosis.fix is not None
     fix = replace(diagnosis.fix, changes=(Change(LAND_SPEED, DRIVEN, DRIVEN),))
-    assert unified_diff(diagnosis.run, fix) == ""
+    assert unified_diff(diagnosis.run, fix.changes) == ""
 
 
 def test_commands_of_each_ecosystem() -> None:

@@ -11,7 +11,6 @@ import pytest
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
-from care_core.diagnose.records import Fix
 from care_core.ecosystems.ardupilot.dialect import ARDUPILOT_PARAM
 from care_core.ecosystems.ros.dialect import ROS1_YAML, ROS2_YAML
 from care_core.errors import ProfileError
@@ -105,7 +104,7 @@ def test_commands_are_quoted_even_if_a_name_got_through(dialect: object, reboot:
         assert "$(id)" not in words
         assert words in ([], ["reboot"]) or words[0] in ("param", "rosparam", "rosrun", "ros2")
     run = planted_run()
-    diff = unified_diff(replace(run, config={"x": 1.0}), Fix((Change(option, 1.0, 2.0),), 0.5, {}))
+    diff = unified_diff(replace(run, config={"x": 1.0}), [Change(option, 1.0, 2.0)])
     assert [line[0] for line in diff.splitlines()] == ["-", "+", "@", "-", "+"]
     assert format_for(run.log.format, run.settings) is ARDUPILOT_PARAM
 
