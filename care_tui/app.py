@@ -12,7 +12,7 @@ from collections.abc import Generator, Iterable
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from textual.app import App, SystemCommand
 from textual.binding import ActiveBinding, Binding, BindingType
@@ -187,6 +187,11 @@ class CareApp(App[int], inherit_bindings=False):
             while self.screen is not self._case:
                 await self.pop_screen()
             await self._case.open_log(path)
+
+    def notify(self, message: str, **how: Any) -> None:
+        """Tell something in passing, in place of what was told before: the same word thrice is one."""
+        self.clear_notifications()
+        super().notify(message, **how)
 
     # Keys and commands that work everywhere
 

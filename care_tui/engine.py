@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,10 +13,13 @@ from care_core.application.history_writing import remember_triage
 from care_core.application.reporting import report_of
 from care_core.errors import CareError
 from care_core.records import Record
+from care_core.report.formats import FORMATS, Format
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
 
+_ESCAPES = re.compile(r"\\([!-/:-@\[-`{-~])")
+"""A sign that Markdown is told to leave as it is."""
 CAUSES = 10
 """Most causes per fault in the app: more than a report shows, for here they scroll."""
 
@@ -41,6 +45,14 @@ def comparison_of(a: Request, b: Request, progress: Progress) -> Callable[[int],
     return lambda width: comparison_text(document, width)
 
 
+def preview_of(case: Case, format: Format) -> str:
+    """The report as it will be written; of a page for a browser what it says, in lines that are wrapped where they are
+    shown. Raises CareError."""
+    if format is FORMATS["html"]:
+        return _ESCAPES.sub(r"\1", report_of(case, "markdown"))
+    return report_of(case, format.name)
+
+
 def save_text(path: Path, text: str) -> None:
     """Write a file; it is whole or not there at all. Of one that is there the operator was asked; a log is kept."""
     from care_core.outputs import write_output
@@ -55,6 +67,7 @@ class Engine(Record):
     predict: Callable[[Case, Mapping[str, float]], Fix] = predict
     diff: Callable[[Case, Fix, DiffSide], str] = diff_of
     report: Callable[[Case, str], str] = report_of
+    preview: Callable[[Case, Format], str] = preview_of
     commands: Callable[[Diagnosis], list[str]] = commands_of
     save: Callable[[Path, str], None] = save_text
     remember: Callable[[Diagnosis, Request], CareError | None] = remember_triage

@@ -197,18 +197,34 @@ class CausesPage(DiagnosisPage):
         doubt = doubt_rows(diagnosis)
         shown = evidence_rows(cause, diagnosis, session.dismissed)
         rows = [*(doubt if cause.is_lead else ()), *shown]
-        rows += self._figure(cause.option.name, cause, len(Rows(rows).wrap(self.reader.room.width)))
-        side = self._of_cause(cause)
-        return Rows(rows if self._is_wide else [*rows, *side])
+        if self._is_wide:
+            return Rows([*rows, *self._figure(cause.option.name, cause, self._height(rows))])
+        path = [*self._path(cause), Row(Content())]
+        # A low pane has a lower plot, so that the path is in view with it; a very low one has it below.
+        around = self._height([*rows, *path])
+        figure = self._figure(cause.option.name, cause, around)
+        is_first = self.reader.room.height - around >= LEAST_FIGURE
+        return Rows([*rows, *(figure if is_first else path), *(path if is_first else figure), *self._worth(cause)])
+
+    def _height(self, rows: list[Row]) -> int:
+        """Lines that rows take."""
+        return len(Rows(rows).wrap(self.reader.room.width))
+
+    def _path(self, cause: Cause) -> list[Row]:
+        assert self.session.result is not None
+        return [heading("Path"), *path_rows(cause, self.session.result, self.glyphs)]
 
     def _of_cause(self, cause: Cause) -> list[Row]:
         """The path of a cause, what its change brings, and the statistics, folded."""
+        return [*self._path(cause), Row(Content()), *self._worth(cause)]
+
+    def _worth(self, cause: Cause) -> list[Row]:
+        """What the change of a cause brings, and the statistics, folded."""
         session, result = self.session, self.session.result
         assert result is not None
         model = session.case.model if session.case else None
         effect = model.effects.get((cause.option.name, result.variable.name)) if model else None
-        rows = [heading("Path"), *path_rows(cause, result, self.glyphs), Row(Content())]
-        rows += worth_rows(cause, result, session.odds_unchanged(), self.glyphs)
+        rows = worth_rows(cause, result, session.odds_unchanged(), self.glyphs)
         doubt = [] if cause.is_lead else doubt_rows(session.diagnosis)
         statistics = statistics_rows(cause, session.causes, effect, self.glyphs)
         return [*rows, *doubt, *folded("Statistics", statistics, self.glyphs, is_open=self._is_open)]
@@ -220,13 +236,13 @@ class CausesPage(DiagnosisPage):
         if finding is None:
             return Rows(rows)
         first = [labelled("Seen by", finding.evidence)] if finding.evidence else []
-        figure = self._figure(finding.title, finding, len(Rows(first).wrap(self.reader.room.width)))
+        figure = self._figure(finding.title, finding, self._height(first))
         return Rows([*first, *figure, *(() if self._is_wide else rows)])
 
-    def _figure(self, name: str, subject: Subject, above: int) -> list[Row]:
-        """The proof as a plot in what room is left."""
+    def _figure(self, name: str, subject: Subject, around: int) -> list[Row]:
+        """The proof as a plot in what room so many lines around it leave."""
         room = self.reader.room
-        height = min(max(room.height - above, LEAST_FIGURE), FIGURE if not self._is_wide else 2 * FIGURE)
+        height = min(max(room.height - around, LEAST_FIGURE), FIGURE if not self._is_wide else 2 * FIGURE)
         return proof_rows(self, name, subject, room.width, height)
 
     @property

@@ -42,8 +42,8 @@ class ReportPage(DiagnosisPage):
         self.forget(REPORT)
         if self.session.state == "data":
             case = self.session.decided_case()
-            shown = FORMATS["markdown"] if self._is_page else self.session.format
-            self.fetched(REPORT, lambda: self.workspace.engine.report(case, shown.name))
+            format = self.session.format
+            self.fetched(REPORT, lambda: self.workspace.engine.preview(case, format))
 
     def view_of_diagnosis(self) -> View:
         tail = "enter writes it, f changes the format"

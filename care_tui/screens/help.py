@@ -18,6 +18,9 @@ from care_tui.widgets.reader import Reader
 Keys = Iterable[tuple[str, str, str]]
 """Keys, what they do, and the id by which the settings give the action another key."""
 
+DOES = 22
+"""Cells of what a key does."""
+
 
 class HelpScreen(ModalScreen[None]):
     """A list of keys and what they do, above the screen they belong to."""
@@ -37,8 +40,9 @@ class HelpScreen(ModalScreen[None]):
     def compose(self) -> ComposeResult:
         width = max((len(key) for key, _, _ in self._keys), default=0) + 2
         rows = [*self._first, Row(Content(self._about)), Row(Content())]
+        rows.append(Row(Content.styled(f"{'key':<{width}}{'what it does':<{DOES}}name in settings.yaml", "dim"), width))
         rows += [
-            Row(Content.assemble((f"{key:<{width}}", "bold $text-accent"), f"{does:<22}", (id, "dim")), width)
+            Row(Content.assemble((f"{key:<{width}}", "bold $text-accent"), f"{does:<{DOES}}", (id, "dim")), width)
             for key, does, id in self._keys
         ]
         with Vertical(classes="dialog"):

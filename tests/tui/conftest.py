@@ -91,6 +91,7 @@ def fake_engine(diagnose: Callable[..., Case]) -> Engine:
         fake_predict,
         fake_diff,
         fake_report,
+        lambda case, format: fake_report(case, "text" if format.name == "html" else format.name),
         fake_commands,
         doubts=lambda _case, _fix: (DOUBT,),
         remember=lambda _diagnosis, _request: None,

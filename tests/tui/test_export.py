@@ -8,10 +8,14 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input, Static
 
+from care_core.application.case import Case
 from care_core.records import replace
+from care_core.report.formats import FORMATS
+from care_tui.engine import preview_of
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
 from care_tui.screens.export import ExportDialog
+from tests.made import made_diagnosis
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
 from tests.tui.test_walk import text, title
@@ -27,7 +31,7 @@ def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ([], "00000042.care.yaml", "yaml", "yaml"),
         (["f"], "00000042.care.md", "markdown", "markdown"),
-        (["f", "f"], "00000042.care.html", "html", "markdown"),
+        (["f", "f"], "00000042.care.html", "html", "text"),
         (["f", "f", "f"], "00000042.care.json", "json", "json"),
         (["f", "f", "f", "f"], "00000042.care.xml", "junit", "junit"),
         (["f", "f", "f", "f", "f"], "00000042.care.patch", "patch", "patch"),
@@ -139,3 +143,11 @@ async def test_what_was_decided_since_a_file_was_written_is_not_what_it_holds(ma
         assert "not what 00000042.care.yaml holds" in title(app)
         await settle(pilot, "4", "space", "6")
         assert "written to 00000042.care.yaml" in title(app)
+
+
+def test_the_text_of_a_page_is_shown_without_the_escapes_of_markdown() -> None:
+    case = Case(made_diagnosis())
+    shown = preview_of(case, FORMATS["html"])
+    assert "mission_time 190 s, wanted <= 150 s" in shown
+    assert "mission\\_time" in case.report("markdown")
+    assert preview_of(case, FORMATS["markdown"]) == case.report("markdown")

@@ -23,7 +23,7 @@ from care_tui.widgets.tab_row import TabRow
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
-from tests.tui.test_walk import index, items, step_of, text, title, walk
+from tests.tui.test_walk import index, items, shown, step_of, text, title, walk
 
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
 needs_sample = pytest.mark.skipif(not SAMPLE.is_file(), reason="the sample is not bundled")
@@ -217,6 +217,16 @@ async def test_a_folder_lists_its_logs_with_verdicts_and_enter_opens_one(tmp_pat
         assert walk(app).here == "objectives"
         await settle(pilot, "escape", "escape")
         assert walk(app).here == "logs"
+
+
+@needs_sample
+@pytest.mark.parametrize("size", [(80, 24), (60, 20), (120, 40)])
+async def test_the_path_of_a_cause_is_in_view_however_low_the_terminal(size: tuple[int, int]) -> None:
+    app = real()
+    async with app.run_test(size=size) as pilot:
+        await settle(pilot, "3")
+        for line in ("LAND_SPEED    16 cm/s", "landing_time  66.13 s", "mission_time  164.7 s", "limit <= 145.6 s"):
+            assert line in shown(app)
 
 
 @needs_sample
