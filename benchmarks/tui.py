@@ -98,6 +98,7 @@ def serve_made() -> None:
         predict=lambda _case, changes: replace(fix, p_fixed=1 / (1 + len(changes))),
         diff=lambda _case, _fix, _side: "-a\n+b\n",
         report=lambda _diagnosis, format: f"report {format}\n" * 100,
+        preview=lambda _case, format: f"report {format.name}\n" * 100,
         commands=lambda _diagnosis: [],
         remember=lambda _diagnosis, _request: None,
     )

@@ -11,14 +11,14 @@ from textual import events
 
 from care_core.application.case import Case, Progress, Request
 from care_core.errors import CareError, ExitCode, LogError, ProfileError
+from care_core.records import replace
 from care_tui.app import CareApp
-from care_tui.engine import Engine
 from care_tui.places import as_path, entries, found_logs, recent_logs, remember
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.settings import Settings
 from care_tui.threads import DaemonThreads
 from tests.tui import sample_diagnosis as sample
-from tests.tui.conftest import LOG, MakeApp, fake_engine, fake_predict, fake_report, settle
+from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
 from tests.tui.test_walk import answer, items, step_of, text, title, walk
 
 
@@ -141,13 +141,14 @@ async def test_a_step_whose_work_fails_shows_that_and_the_others_go_on() -> None
     def diagnose(*_: object) -> Case:
         return Case(sample.faulty(), sample.OPTIONS)
 
-    app = CareApp(Request(LOG), engine=Engine(diagnose, fake_predict, fails, fake_report), settings=Settings(places=()))
+    engine = replace(fake_engine(diagnose), diff=fails)
+    app = CareApp(Request(LOG), engine=engine, settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "5")
         assert "No configuration format." in text(app)
         await settle(pilot, "6")
         assert text(app).startswith("report: yaml")
-    app = CareApp(Request(LOG), engine=Engine(diagnose, fails, fails, fake_report), settings=Settings(places=()))  # type: ignore[arg-type]
+    app = CareApp(Request(LOG), engine=replace(engine, predict=fails), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4", "space")
         assert "No configuration format." in text(app)
