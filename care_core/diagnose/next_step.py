@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
-from care_core.diagnose.records import Diagnosis, helps
+from care_core.diagnose.records import Diagnosis, Fix, helps
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, vehicle_of
