@@ -431,3 +431,39 @@ def test_a_laser_that_pauses_again_and_again_while_the_odometry_goes_on_drops_ou
     assert (finding.kind, finding.title) == ("laser", "the laser drops out: /front/scan pauses")
     assert finding.evidence.startswith("3 pauses of up to 1.6 s, one scan every 0.2 s else")
     assert not [one for one in looked_at(Pausing("link"), tmp_path).findings if "drops out" in one.title]
+
+
+class Repeating(Drive):
+    """Its drivers send faster than their data are new: each message of odometry and laser goes out three times."""
+
+    again: int = 3
+
+    def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+        for topic, name, time_s, message in super().messages():
+            yield topic, name, time_s, message
+            for number in range(1, self.again if name in (ODOMETRY, SCAN) else 1):
+                yield topic, name, time_s + 0.06 * number, self._repeated(name, message, time_s + 0.06 * number)
+
+    def _repeated(self, name: str, message: Any, time_s: float) -> Any:
+        stamped = dataclasses.replace(message.header, stamp=stamp(ROS2, START_NS + round(time_s * SECOND_NS)))
+        if name == SCAN:
+            return dataclasses.replace(message, header=stamped)
+        still = dataclasses.replace(message.twist, twist=dataclasses.replace(message.twist.twist, **RESTING))
+        return dataclasses.replace(message, header=stamped, twist=still)
+
+
+RESTING = {
+    "linear": ROS2.types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0),
+    "angular": ROS2.types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("again", [2, 3])
+def test_what_a_driver_sends_again_is_no_standstill_and_no_stuck_laser(again: int, tmp_path: Path) -> None:
+    assert looked_at(Repeating(again=again), tmp_path).findings == ()
+
+
+@pytest.mark.parametrize(("fault", "kind"), [("loss", "commands"), ("laser stuck", "laser")])
+def test_it_still_is_seen_where_messages_are_sent_again(fault: str, kind: str, tmp_path: Path) -> None:
+    first = looked_at(Repeating(fault, ABORTED), tmp_path).findings[0]
+    assert (first.kind, first.suspect) == (kind, "hardware")

@@ -13,7 +13,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import BATTERY, COMMANDS, GOALS, ODOMETRY, reading
-from care_core.ecosystems.ros.motion import BREAKS_LOOSE_MPS, Following
+from care_core.ecosystems.ros.motion import ANSWER_S, BREAKS_LOOSE_MPS, Following
 from care_core.ecosystems.ros.sensors import Battery
 from care_core.numbers import Bools, Floats, known_median, median, quantile
 from care_core.records import replace
@@ -40,6 +40,8 @@ STEADY_RADPS = LIMITS.add("change of a steady turn", 0.3, "rad/s", "a drive answ
 PULL_MPS = LIMITS.add("commanded speed while it pulls", 0.1, "m/s", "slower, noise of the turn is more than the pull")
 PULL_DRIVEN_MPS = LIMITS.add("speed while it pulls", 0.05, "m/s", "slower, noise of the turn is more than the pull")
 RESTS_M = LIMITS.add("way in a standstill", 0.03, "m", "it stops and starts in it")
+REPEATED = int(LIMITS.add("samples of a standstill of odometry alone", 4, "", "drivers repeat a pose 2 to 4 times"))
+KEEPS_UP = LIMITS.add("share of its speed that a robot keeps over a second", 0.7, "", "a stop of 0.3 s costs as much")
 LOST_S = LIMITS.add("pause between samples", 3.0, "s", "over a longer one nobody knows whether the robot stood")
 SLOW_LOST_S = LIMITS.add("pause between slow samples", 2.0, "s", "over a longer one nobody knows how fast it was")
 FASTER = LIMITS.add("ratio of speeds that shows a drive was not weak", 1.3, "", "clearly more than noise of odometry")
@@ -68,7 +70,8 @@ def find(drive: Drive) -> Iterator[Finding]:
     long = [(start, end) for start, end in still if end - start >= STANDS_S]
     if long:
         yield _standing(drive, motion, long)
-    yield from _stopping(drive, motion, [stop for stop in still if stop not in long and _rests(motion, stop)])
+    short = [stop for stop in still if stop not in long and _rests(motion, stop) and not _keeps_up(motion, stop)]
+    yield from _stopping(drive, motion, short)
     slow = list(_slow(drive, motion, stood))
     yield from slow
     if not slow:  # a drive that does less than commanded turns otherwise than commanded, too
@@ -214,6 +217,24 @@ def _rests(motion: Following, span: tuple[float, float]) -> bool:
     went = float(np.hypot(odometry.x[high] - odometry.x[low], odometry.y[high] - odometry.y[low]))
     wanted = float(np.abs(motion.wanted_speed[first : last + 1]).max())
     return went <= max(STANDING * wanted, STILL) * float(odometry.t[high] - odometry.t[low]) + RESTS_M
+
+
+def _keeps_up(motion: Following, span: tuple[float, float]) -> bool:
+    """Whether it is the odometry that stands, not the robot: in a few samples it repeats itself, and over the second
+    around them the robot came as far as it was commanded."""
+    odometry = motion.odometry
+    first, last = np.searchsorted(odometry.t, span)
+    if odometry.stands_still or last - first >= REPEATED:
+        return False
+    half_s = max(ANSWER_S, 2 * (span[1] - span[0])) / 2
+    middle = (span[0] + span[1]) / 2
+    at = np.clip((middle - half_s, middle + half_s), odometry.t[0], odometry.t[-1])
+    x, y, yaw = (np.interp(at, odometry.t, axis) for axis in (odometry.x, odometry.y, np.unwrap(odometry.yaw)))
+    wanted = min(float(np.abs(motion.wanted_speed[first : last + 1]).max()), odometry.fastest_mps)
+    if wanted >= BREAKS_LOOSE_MPS:
+        return float(np.hypot(np.diff(x), np.diff(y))[0]) >= KEEPS_UP * wanted * float(np.diff(at)[0])
+    turn = float(np.abs(motion.wanted_turn[first : last + 1]).max())
+    return abs(float(np.diff(yaw)[0])) >= KEEPS_UP * turn * float(np.diff(at)[0])
 
 
 def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:

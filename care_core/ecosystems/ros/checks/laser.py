@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +12,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import CLOUD, GOALS, ODOMETRY, ROSOUT, SCAN, reading, type_of
-from care_core.ecosystems.ros.motion import stretches
+from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS, stretches
 from care_core.ecosystems.ros.sensors import Scans
 from care_core.numbers import Floats, median, quantile
 from care_core.text import shortened
@@ -31,6 +31,11 @@ RETURNS = LIMITS.add("rays that hit something in a scan that tells", 5, "", "an 
 FROZEN_SCANS = LIMITS.add("scans alike to the last bit", 3, "", _FROZEN)
 FROZEN_M = LIMITS.add("way while they are alike", 0.15, "m", _FROZEN)
 FROZEN_RAD = LIMITS.add("turn while they are alike", 0.15, "rad", _FROZEN)
+TWICE = LIMITS.add(
+    "share of scans like the one before of a driver that sends each again", 0.1, "",
+    "a choice: healthy lasers repeat none while the robot moves",
+)  # fmt: skip
+STUCK_TIMES = LIMITS.add("scans alike against those that a driver repeats", 4.0, "", "a choice: beyond any such run")
 DROPS = LIMITS.add("pauses of the scans alone", 3, "", "one or two are chance")
 DROPS_S = LIMITS.add("such a pause", 1.0, "s", "a choice: a robot of 0.5 m/s goes half a metre blind")
 DROPS_PERIODS = LIMITS.add("such a pause, in periods", 6.0, "", "a choice: of recordings that are thinned")
@@ -113,23 +118,56 @@ def _heard(times: Floats, start: float, end: float) -> int:
 def _frozen(drive: Drive, scans: Scans) -> Iterator[Finding]:
     same = np.array([a.tobytes() == b.tobytes() for a, b in pairwise(scans.raw)], bool)
     same &= np.isfinite(scans.ranges[1:]).sum(axis=1) >= RETURNS  # where nothing is near, every scan is alike
-    for start, end in stretches(scans.t[1:], same, BREAK_PERIODS * _period(scans)):
-        rows = (scans.t >= start) & (scans.t <= end)
-        if np.count_nonzero(rows) < FROZEN_SCANS or not _moved(drive, start, end):
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], same, [False])).astype(np.int8)))
+    runs = [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+    again = [last - first for first, last in runs if _moves(drive, scans.t[first], scans.t[last])]
+    for first, last in runs:
+        start, end, count = float(scans.t[first]), float(scans.t[last]), last - first
+        if count < FROZEN_SCANS or not _moved(drive, start, end) or _sent_again(again, count, len(same)):
             continue
-        evidence = f"{np.count_nonzero(rows) + 1} scans alike to the last bit while the robot moved"
-        evidence += f" {drive.moved_between(start, end):.1f} m"
+        evidence = f"{count + 1} scans alike to the last bit while the robot {_way(drive, start, end)}"
         yield _finding(drive, "the laser is stuck: it repeats the same scan", (start, end), evidence, scans.topic)
         return
 
 
-def _moved(drive: Drive, start: float, end: float) -> bool:
+def _sent_again(runs: Sequence[int], count: int, steps: int) -> bool:
+    """Whether so many scans alike are what its driver does: faster than the laser turns, it sends each scan again.
+
+    Args:
+        runs: how many in a row were like the one before, each time that they were while the robot moved.
+    """
+    short = [one for one in runs if one < count]
+    return sum(short) >= TWICE * steps and count < STUCK_TIMES * float(median(short))
+
+
+def _moves(drive: Drive, start: float, end: float) -> bool:
+    """Whether the robot is under way in a time, however short."""
     odometry = drive.odometry
     if odometry is None:
         return False
+    first, last = np.searchsorted(odometry.t, (start, end))
+    rows = slice(max(int(first) - 1, 0), int(last) + 1)
+    return bool(np.any(np.abs(odometry.speed[rows]) > STANDS_MPS) or np.any(np.abs(odometry.turn[rows]) > STANDS_RADPS))
+
+
+def _way(drive: Drive, start: float, end: float) -> str:
+    """How far it moved, or turned where it hardly moved."""
+    went, turned = drive.moved_between(start, end), _turned(drive, start, end)
+    return f"moved {went:.1f} m" if went > FROZEN_M else f"turned by {np.degrees(turned):.0f} deg"
+
+
+def _moved(drive: Drive, start: float, end: float) -> bool:
+    if drive.odometry is None:
+        return False
+    return drive.moved_between(start, end) > FROZEN_M or _turned(drive, start, end) > FROZEN_RAD
+
+
+def _turned(drive: Drive, start: float, end: float) -> float:
+    """How far the robot turned in a time, rad."""
+    odometry = drive.odometry
+    assert odometry is not None
     inside = (odometry.t >= start) & (odometry.t <= end)
-    turned = float(np.sum(np.abs(np.diff(np.unwrap(odometry.yaw[inside])))))
-    return drive.moved_between(start, end) > FROZEN_M or turned > FROZEN_RAD
+    return float(np.sum(np.abs(np.diff(np.unwrap(odometry.yaw[inside])))))
 
 
 def _noisy(drive: Drive, scans: Scans) -> Iterator[Finding]:
