@@ -467,3 +467,57 @@ def test_what_a_driver_sends_again_is_no_standstill_and_no_stuck_laser(again: in
 def test_it_still_is_seen_where_messages_are_sent_again(fault: str, kind: str, tmp_path: Path) -> None:
     first = looked_at(Repeating(fault, ABORTED), tmp_path).findings[0]
     assert (first.kind, first.suspect) == (kind, "hardware")
+
+
+class Hits(Drive):
+    """A contact is told when the fault begins: the robot tips over, is pushed along, or stays where it is."""
+
+    def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+        for topic, name, time_s, message in super().messages():
+            if name == ODOMETRY and self.fault == "tips" and time_s > FAILS_AT_S:
+                message.pose.pose.orientation = TIPPED
+                message.pose.pose.position.z = 0.2
+            yield topic, name, time_s, message
+        yield "/collision_event", "std_msgs/msg/Empty", FAILS_AT_S, EMPTY
+
+    def _driven(self, t: float, speed: float, turn: float) -> tuple[float, float]:
+        return (0.0, 0.0) if self.fault in ("tips", "held") else super()._driven(t, speed, turn)
+
+    def _move(self, speed: float, turn: float, *, onset: bool, failing: bool) -> None:
+        super()._move(speed, turn, onset=onset, failing=failing)
+        pushed = failing and self.fault == "pushed" and self.off_x < 1.0
+        self.off_x += 0.2 * speed * 0.04 if pushed else 0.0
+
+
+TIPPED = ROS2.types["geometry_msgs/msg/Quaternion"](0.7071, 0.0, 0.0, 0.7071)
+EMPTY = ROS2.types["std_msgs/msg/Empty"]()
+
+
+@pytest.mark.parametrize("outcome", [ABORTED, SUCCEEDED])
+def test_a_robot_that_tips_over_is_told_first_and_what_follows_from_it(outcome: int, tmp_path: Path) -> None:
+    health = looked_at(Hits("tips", outcome), tmp_path)
+    first = health.findings[0]
+    assert (first.kind, first.title, first.severity) == ("crash", "the robot tips over", "critical")
+    assert first.onset_s == pytest.approx(FAILS_AT_S, abs=0.5)
+    assert "tilted by up to 90 deg" in first.evidence
+    assert "and so to the end, its height changes by 0.2 m, a contact is told at 16.0 s" in first.evidence
+    assert [one.kind for one in first.consequences] == ["drive"]
+    assert any(one.text == "1 contact told by /collision_event: 16.0 s" for one in health.timeline)
+
+
+def test_odometry_does_not_drift_while_something_pushes_the_robot(tmp_path: Path) -> None:
+    assert [one for one in looked_at(Hits("pushed"), tmp_path).findings if "drifts" in one.title] == []
+
+
+@pytest.mark.parametrize(("outcome", "told"), [(ABORTED, True), (SUCCEEDED, False)])
+def test_a_robot_that_a_contact_holds_is_told(outcome: int, told: bool, tmp_path: Path) -> None:
+    titles = [one.title for one in looked_at(Hits("held", outcome), tmp_path).findings]
+    assert ("the robot hits something and gets no further" in titles) is told
+
+
+def test_what_nobody_drives_does_not_tip_over(tmp_path: Path) -> None:
+    class InAHand(Hits):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            yield from (one for one in super().messages() if one[1] == ODOMETRY)
+
+    assert [one for one in looked_at(InAHand("tips"), tmp_path).findings if one.kind == "crash"] == []

@@ -17,6 +17,7 @@ from care_core.ecosystems.findings import Severity
 from care_core.ecosystems.liveness import Frozen, is_part
 from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros import sources
+from care_core.ecosystems.ros.falls import Fall, fall_of
 from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, actionlib_goals, nav2_goals
 from care_core.ecosystems.ros.messages import (
     ACTION_GOAL,
@@ -26,6 +27,7 @@ from care_core.ecosystems.ros.messages import (
     DIAGNOSTICS,
     FAULT_EVENT,
     FRAME,
+    IMU,
     LOCALISED,
     MESSAGES,
     ODOMETRY,
@@ -34,6 +36,8 @@ from care_core.ecosystems.ros.messages import (
     STATUS,
     TWIST,
     TWIST_STAMPED,
+    holds,
+    tilt_of,
     topics,
     type_of,
 )
@@ -61,6 +65,12 @@ DROVE_M = 1.0
 """So far no robot is pushed or drifts that is done with its goals."""
 PILOTED = re.compile(r"joy|teleop|key", re.IGNORECASE)
 """In the name of a topic on which a person drives."""
+CONTACT = re.compile(r"contact|collision|bumper", re.IGNORECASE)
+"""In the name of a topic on which something speaks only while it touches the robot, or at times."""
+MOST_CONTACTS = 50
+"""A topic that says more tells of what does not touch, too."""
+LATCHED_S, SAME_CONTACT_S = 1.0, 0.5
+"""What comes so early was said before the recording began; what comes so close together is one contact."""
 _SIMULATED_CLOCK = "/clock"
 FEWEST_COMMANDS = 3
 """Fewer commands tell of no drive."""
@@ -278,6 +288,39 @@ class Drive(RunModel):
     def moved_between(self, start_s: float, end_s: float) -> float:
         """Distance that odometry went in a time, m; nan where there is none."""
         return math.nan if self.odometry is None else self.odometry.path_m(start_s, end_s)
+
+    @cached_property
+    def contact_topics(self) -> tuple[str, ...]:
+        """Topics by whose names something touched the robot when they speak, which they do at times."""
+        return tuple(
+            one.name
+            for one in self.channels
+            if CONTACT.search(one.name) and 0 < one.count <= MOST_CONTACTS and one.name not in self.streams
+        )
+
+    @cached_property
+    def contacts_s(self) -> Floats:
+        """When something touched the robot, by topics that speak only then."""
+        told = [self.times[name][self.times[name] > LATCHED_S] for name in self.contact_topics]
+        every = np.sort(np.concatenate([np.empty(0), *told]))
+        return every[np.diff(every, prepend=-np.inf) > SAME_CONTACT_S]
+
+    @cached_property
+    def fall(self) -> Fall | None:
+        """When the robot tipped over; None of what nobody drives, such as a camera in a hand."""
+        if self.odometry is None or (self.commands is None and not self.goals):
+            return None
+        odometry = self.odometry
+        return fall_of(odometry.topic, odometry.t, odometry.tilt, odometry.z, odometry.path_m) or self._felt_fall()
+
+    def _felt_fall(self) -> Fall | None:
+        """The same by an IMU, where it tells an orientation."""
+        assert self.odometry is not None
+        for topic, table in self.of(IMU):
+            if holds(table, IMU):
+                tilt = tilt_of(table, IMU, "orientation")
+                return fall_of(topic, table.t, tilt, np.zeros(len(table)), self.odometry.path_m)
+        return None
 
     # Sensors
 

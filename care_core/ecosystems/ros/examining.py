@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
+from care_core.ecosystems.explains import EXPLAINS
 from care_core.ecosystems.findings import Finding, Health
-from care_core.ecosystems.ranking import rank_findings
+from care_core.ecosystems.ranking import SLACK_S, rank_findings
 from care_core.ecosystems.ros.checks import CHECKS
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive
+from care_core.ecosystems.ros.falls import Fall
 from care_core.ecosystems.ros.messages import (
     BATTERY,
     DIAGNOSTICS,
@@ -19,10 +23,13 @@ from care_core.ecosystems.ros.messages import (
 from care_core.ecosystems.ros.other_robots import other_robots
 from care_core.ecosystems.ros.timeline import READS, timeline
 from care_core.logs.base import merge_needs
+from care_core.records import replace
 from care_core.text import listed
 
 SHORT_S = 5.0
 """Nothing can be said of how a robot drives in less."""
+_AFTER_S = 1e-3
+"""How long after a fall begins what is seen with it."""
 _UNREAD = "not decoded "
 """How the facts about encodings begin that no reader knows."""
 _STREAMS = {ODOMETRY: "odometry", SCAN: "laser", BATTERY: "battery"}
@@ -35,13 +42,21 @@ _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 def examine(drive: Drive) -> Health:
     """What happened in a ROS 1 bag or a ROS 2 drive."""
     others = [(other, _found(other)) for other in drive.others]
-    findings = rank_findings((*_found(drive), *other_robots(drive, others)))
+    found = (*_with_fall(_found(drive), drive.fall), *other_robots(drive, others))
+    findings = rank_findings(found, None if drive.fall is None else drive.fall.start_s)
     return Health(_robot(drive), timeline(drive), findings, _too_little(drive))
 
 
 def _found(drive: Drive) -> tuple[Finding, ...]:
     drive.look_at(merge_needs((READS, *(check.reads for check in CHECKS))))
     return tuple(finding for check in CHECKS for finding in check.find(drive))
+
+
+def _with_fall(found: Iterable[Finding], fall: Fall | None) -> Iterator[Finding]:
+    """The findings, where what a fall brings about is not told to begin before it: samples do not tell which was first."""
+    for one in found:
+        is_with = fall is not None and one.kind in EXPLAINS["crash"] and 0 <= fall.start_s - one.onset_s <= SLACK_S
+        yield replace(one, onset_s=fall.start_s + _AFTER_S) if is_with and fall is not None else one
 
 
 def _robot(drive: Drive) -> str:

@@ -17,7 +17,7 @@ from care_core.ecosystems.dictionary import Field, Message
 from care_core.ecosystems.plausible import STAMP
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.ros_message import short_name
-from care_core.numbers import Floats
+from care_core.numbers import Floats, median
 
 ODOMETRY = "nav_msgs/Odometry"
 TWIST, TWIST_STAMPED = "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
@@ -76,6 +76,10 @@ _FAR_M, _FAST, _ELECTRIC, _HARDEST_MPS2, _UNIT = 1e7, 1e3, 1e4, 1e4, 2.0
 hours, accelerations. Parts of a unit quaternion lie within 1; one beyond 2 is damaged, not rounded."""
 
 
+_UNIT_ERROR = 0.1
+"""Error of the length of a unit quaternion: a driver without an orientation sends zeros."""
+
+
 class RosMessage(Message):
     """A type of message: what the model of a drive reads of it, and how much."""
 
@@ -95,6 +99,7 @@ def _position(axis: str) -> Field:
 
 
 _PARTS = tuple(f"orientation.{axis}" for axis in "xyzw")
+HEIGHT = "pose.pose.position.z"
 _ORIENTATION = {part: _number("", most=_UNIT) for part in _PARTS}
 _POSE = {
     "pose.pose.position.x": _position("x"),
@@ -133,7 +138,9 @@ def _reads(*fields: str, at_most: int = 0, label: str = "") -> RosMessage:
 
 
 MESSAGES: Mapping[str, RosMessage] = {
-    ODOMETRY: RosMessage({**_VELOCITY, **_POSE}, reads=(STAMP, *_POSE, *_VELOCITY), at_most=20_000),
+    ODOMETRY: RosMessage(
+        {**_VELOCITY, **_POSE, HEIGHT: _position("z")}, reads=(STAMP, *_POSE, HEIGHT, *_VELOCITY), at_most=20_000
+    ),
     TWIST: RosMessage(_COMMAND, reads=tuple(_COMMAND), at_most=20_000),
     TWIST_STAMPED: RosMessage(_STAMPED_COMMAND, reads=tuple(_STAMPED_COMMAND), at_most=20_000),
     SCAN: RosMessage(_ANGLES, reads=(STAMP, *_ANGLES, "range_min", "range_max", "ranges"), at_most=2_500),
@@ -205,6 +212,18 @@ def yaw_of(table: Table, prefix: str) -> Floats:
     x, y, z, w = (np.clip(column, -1.0, 1.0) for column in columns)
     yaw: Floats = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return yaw
+
+
+def tilt_of(table: Table, type: str, prefix: str) -> Floats:
+    """Angle of the robot's upward axis to what it was at first, deg, shape (n,); zero without an orientation."""
+    x, y, z, w = (believable(table, type, f"{prefix}.{axis}") for axis in "xyzw")
+    length = x * x + y * y + z * z + w * w
+    if not np.isfinite(length).all() or not np.all(np.abs(length - 1) < _UNIT_ERROR):
+        return np.zeros(len(table))
+    up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
+    first = median(up[: max(5, len(up) // 50)], axis=0)
+    angle: Floats = np.degrees(np.arccos(np.clip(up @ (first / np.linalg.norm(first)), -1, 1)))
+    return angle
 
 
 def _within(column: NDArray[Any], low: float, high: float) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from care_core.ecosystems.plausible import STAMP
-from care_core.ecosystems.ros.messages import FRAME, ODOMETRY, TWIST, TWIST_STAMPED, believable, yaw_of
+from care_core.ecosystems.ros.messages import FRAME, HEIGHT, ODOMETRY, TWIST, TWIST_STAMPED, believable, tilt_of, yaw_of
 from care_core.logs.base import Table
 from care_core.numbers import Bools, Floats, median, quantile
 from care_core.records import Record, replace
@@ -55,6 +55,9 @@ class Odometry(Record, eq=False):
     """Forward, negative backwards."""
     sideways: Floats
     turn: Floats
+    z: Floats
+    tilt: Floats
+    """To what was upright at first, deg."""
     numberless_s: Floats
     """When messages without numbers were recorded, shape (m,)."""
 
@@ -114,7 +117,7 @@ class Odometry(Record, eq=False):
         """The samples of a mask."""
         if good.all():
             return self
-        columns = ("recorded_s", "t", "clock", "x", "y", "yaw", "speed", "sideways", "turn")
+        columns = ("recorded_s", "t", "clock", "x", "y", "yaw", "speed", "sideways", "turn", "z", "tilt")
         return replace(self, **{name: getattr(self, name)[good] for name in columns})
 
 
@@ -159,6 +162,8 @@ def odometry_of(topic: str, table: Table) -> Odometry | None:
         speed=speed[good],
         sideways=sideways[good],
         turn=turn[good],
+        z=(believable(table, ODOMETRY, HEIGHT) if HEIGHT in table.columns else np.zeros(len(table)))[good],
+        tilt=tilt_of(table, ODOMETRY, "pose.pose.orientation")[good],
         numberless_s=table.t[~good],
     )
 

@@ -38,7 +38,7 @@ from care_core.logs.ros_message import short_name
 from care_core.numbers import Floats
 from care_core.text import log_time
 
-_GOALS, _MESSAGES, _REPORTS, _CHANGES = 12, 14, 6, 5
+_GOALS, _MESSAGES, _REPORTS, _CHANGES, _CONTACTS = 12, 14, 6, 5, 6
 """Lines of each sort at most."""
 PAUSE_S, PAUSE_PERIODS = 3.0, 10.0
 """A stream that pauses so long, and so many of its periods, is told of."""
@@ -63,6 +63,7 @@ def timeline(drive: Drive) -> tuple[Event, ...]:
         *_log_messages(drive),
         *_diagnostics(drive),
         *_pauses(drive),
+        *_contacts(drive),
         *_lifecycle(drive),
         *_changes(drive),
         *_motion(drive),
@@ -193,6 +194,15 @@ def _slower(topic: str, times: Floats, usual: float) -> Iterator[Event]:
         else:
             at, how, (now, before) = slow[0], "slower", rates
         yield Event(float(times[at]), "topic", f"{topic} becomes {how}: {now} instead of {before}", topic)
+
+
+def _contacts(drive: Drive) -> Iterator[Event]:
+    """What touched the robot, by the topics that tell of it."""
+    times = drive.contacts_s.tolist()
+    if times:
+        when = _listed((log_time(at) for at in times), _CONTACTS)
+        words = f"{counted(len(times), 'contact')} told by {_listed(drive.contact_topics)}: {when}"
+        yield Event(times[0], "contact", words, drive.contact_topics[0])
 
 
 def _lifecycle(drive: Drive) -> Iterator[Event]:

@@ -11,6 +11,7 @@ from care_core.ecosystems.ros.checks import (
     battery,
     blocked,
     drive,
+    falls,
     imu,
     laser,
     messages,
@@ -25,6 +26,7 @@ from care_core.ecosystems.ros.drive import Drive
 
 CHECKS: tuple[Check[Drive], ...] = (
     battery.CHECK,
+    falls.CHECK,
     laser.CHECK,
     odometry.CHECK,
     recorded.CHECK,

@@ -65,8 +65,7 @@ def find(drive: Drive) -> Iterator[Finding]:
     motion = drive.following
     if motion is None:
         return
-    stood = _stood(motion)
-    still = _unbroken(motion.odometry.t[motion.to_move], stood[motion.to_move])
+    stood, still = _stood(motion), standstills(drive)
     long = [(start, end) for start, end in still if end - start >= STANDS_S]
     if long:
         yield _standing(drive, motion, long)
@@ -76,6 +75,14 @@ def find(drive: Drive) -> Iterator[Finding]:
     yield from slow
     if not slow:  # a drive that does less than commanded turns otherwise than commanded, too
         yield from _pulling(drive, motion)
+
+
+def standstills(drive: Drive) -> list[tuple[float, float]]:
+    """When the robot stood against its commands, however shortly."""
+    motion = drive.following
+    if motion is None:
+        return []
+    return _unbroken(motion.odometry.t[motion.to_move], _stood(motion)[motion.to_move])
 
 
 def obeys(drive: Drive, since_s: float) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,9 +10,9 @@ import numpy as np
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import COMMANDS, GOALS, IMU, ODOMETRY, believable, holds, reading
+from care_core.ecosystems.ros.messages import COMMANDS, GOALS, IMU, ODOMETRY, believable, holds, reading, tilt_of
 from care_core.logs.base import Table
-from care_core.numbers import Floats, median
+from care_core.numbers import median
 from care_core.text import log_time
 
 LIMITS = Limits()
@@ -24,8 +25,8 @@ TIP_DEG = LIMITS.add(
 )
 LEAST_MPS2 = LIMITS.add("least usual acceleration", 7.8, "m/s2", "gravity, 9.8, less a badly scaled sensor's error")
 MOST_MPS2 = LIMITS.add("greatest usual acceleration", 11.8, "m/s2", "gravity and a badly scaled sensor's error")
+BEFORE_S = LIMITS.add("shocks that belong to a fall come so long before", 3.0, "s", "a choice: a robot tips in one")
 MESSAGES_FELT = LIMITS.add("messages of an IMU", 50, "", "fewer do not tell what is usual")
-UNIT_ERROR = LIMITS.add("error of a unit quaternion", 0.1, "", "a driver without an orientation sends zeros")
 
 
 def find(drive: Drive) -> Iterator[Finding]:
@@ -43,9 +44,10 @@ def _felt(drive: Drive, topic: str, table: Table) -> Iterator[Finding]:
     good = np.isfinite(felt)
     if not good.any() or not LEAST_MPS2 <= float(median(felt[good])) <= MOST_MPS2:
         return
-    t, tilt = table.t, _tilt(table)
-    hits = np.flatnonzero(good & (np.abs(felt - median(felt[good])) > SHOCK_MPS2))
-    tips = np.flatnonzero(tilt > TIP_DEG)
+    t, tilt = table.t, tilt_of(table, IMU, "orientation")
+    over_s = math.inf if drive.fall is None else drive.fall.start_s - BEFORE_S
+    hits = np.flatnonzero(good & (np.abs(felt - median(felt[good])) > SHOCK_MPS2) & (t < over_s))
+    tips = np.flatnonzero((tilt > TIP_DEG) & math.isinf(over_s))  # a fall is told by what shows it best
     if not len(hits) and not len(tips):
         return
     at = float(t[min(hits[:1].tolist() + tips[:1].tolist())])
@@ -62,18 +64,6 @@ def _felt(drive: Drive, topic: str, table: Table) -> Iterator[Finding]:
         suspect="operation",
         probability=0.7,
     )
-
-
-def _tilt(table: Table) -> Floats:
-    """Angle of the robot's upward axis to what it was at first, deg, shape (n,); zero without an orientation."""
-    x, y, z, w = (believable(table, IMU, f"orientation.{axis}") for axis in "xyzw")
-    length = x * x + y * y + z * z + w * w
-    if not np.all(np.abs(length[np.isfinite(length)] - 1) < UNIT_ERROR) or not np.isfinite(length).all():
-        return np.zeros(len(table))
-    up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
-    first = median(up[: max(5, len(up) // 50)], axis=0)
-    angle: Floats = np.degrees(np.arccos(np.clip(up @ (first / np.linalg.norm(first)), -1, 1)))
-    return angle
 
 
 READS = reading(IMU, ODOMETRY, *COMMANDS, *GOALS)

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.plausible import STAMP
+from care_core.ecosystems.ros.checks.drive import standstills
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive, way_through
 from care_core.ecosystems.ros.messages import COMMANDS, GOALS, MESSAGES, ODOMETRY, TF, holds, reading
 from care_core.ecosystems.ros.motion import STALE_S, Odometry, never_moved
@@ -45,6 +47,8 @@ IN_TURN = LIMITS.add(
 BACK = LIMITS.add("how near it is to where it was, in steps", 0.3, "", "while the robot moves, both change a little")
 PLACES = LIMITS.add("transforms of map -> odom", 3, "", "fewer show no step")
 FOUND_S = LIMITS.add("time to find the robot on the map", 5.0, "s", "the first corrections are large")
+PUSHED_S = LIMITS.add("time after a contact that is not compared", 10.0, "s", "a choice: it pushes, or backs off")
+BEFORE_S = LIMITS.add("time before it that is not either", 1.0, "s", "a choice: who tells of it is late")
 PAUSE_S = LIMITS.add("pause between samples", STALE_S, "s", "over a longer one the speed is not known")
 
 
@@ -140,7 +144,7 @@ def _drift(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
     """
     went, least, most = _steps(odometry)
     beyond = np.where(went > most, went - most, np.where(went < least, went - least, 0.0))
-    usable = (odometry.dt < PAUSE_S) & (np.abs(beyond) < JUMP_M)
+    usable = (odometry.dt < PAUSE_S) & (np.abs(beyond) < JUMP_M) & ~inside(_pushed(drive), odometry.t)
     extra = np.cumsum(np.where(usable, beyond, 0.0))
     way = np.cumsum(np.where(usable, (least + most) / 2, 0.0))
     for over_m, most_share in DRIFTS:
@@ -151,6 +155,13 @@ def _drift(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
         if len(rows):
             yield from _drifting(drive, odometry, extra, way, share, rows, most_share)
             return
+
+
+def _pushed(drive: Drive) -> list[tuple[float, float]]:
+    """When something else than its wheels moved or held the robot: contacts, a fall, standing against commands."""
+    spans = [(at - BEFORE_S, at + PUSHED_S) for at in drive.contacts_s.tolist()]
+    spans += [] if drive.fall is None else [(drive.fall.start_s - BEFORE_S, np.inf)]
+    return spans + [(start - BEFORE_S, end + BEFORE_S) for start, end in standstills(drive)]
 
 
 def _drifting(

@@ -9,7 +9,7 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind
-from care_core.ecosystems.ros.drive import SILENT_PERIODS, SILENT_S, Drive
+from care_core.ecosystems.ros.drive import CONTACT, SILENT_PERIODS, SILENT_S, Drive
 from care_core.ecosystems.ros.messages import (
     BATTERY,
     CLOUD,
@@ -45,8 +45,6 @@ LIMITS.add("silence of a stream in its periods", SILENT_PERIODS, "", _LOADED)
 _QOS = re.compile(r"incompatible qos", re.IGNORECASE)
 _TOPIC = re.compile(r"topic '?\"?([\w/~]+)")
 _KINDS: dict[str, FindingKind] = {ODOMETRY: "localisation", IMU: "imu", BATTERY: "battery"}
-_CONTACT = re.compile(r"contact|collision|bumper", re.IGNORECASE)
-"""Topics that speak only while something touches (gazebo_ros bumpers and their like)."""
 _JUDGED_ELSEWHERE = (SCAN, CLOUD, *COMMANDS, STATUS)
 
 
@@ -135,7 +133,7 @@ def _comes_in_a_burst(times: Floats, after_s: float) -> bool:
 def _ended(drive: Drive) -> Iterator[Finding]:
     for channel in drive.channels:
         type = type_of(channel)
-        if type in (*_JUDGED_ELSEWHERE, *WITHOUT_STREAM) or _CONTACT.search(channel.name):
+        if type in (*_JUDGED_ELSEWHERE, *WITHOUT_STREAM) or CONTACT.search(channel.name):
             continue
         over = drive.ends_early(channel.name)
         if over is None or drive.duration_s - over[0] < ENDED * drive.duration_s:
