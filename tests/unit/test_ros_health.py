@@ -521,3 +521,41 @@ def test_what_nobody_drives_does_not_tip_over(tmp_path: Path) -> None:
             yield from (one for one in super().messages() if one[1] == ODOMETRY)
 
     assert [one for one in looked_at(InAHand("tips"), tmp_path).findings if one.kind == "crash"] == []
+
+
+class Saturating(Drive):
+    """Whose wheels reach half of what is commanded while it is to turn as well, to `sides` one after the other."""
+
+    sides: tuple[float, ...] = (1.0, -1.0)
+
+    def _turn(self, t: float) -> float:
+        return self.sides[int(t / 3.0) % len(self.sides)]
+
+    def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+        for topic, name, time_s, message in super().messages():
+            if name == TWIST and time_s >= FAILS_AT_S:
+                message.angular.z = self._turn(time_s)
+            yield topic, name, time_s, message
+
+    def _driven(self, t: float, speed: float, turn: float) -> tuple[float, float]:
+        share = 1.0 if self._turn(t) == 0.0 else 0.5
+        return share * speed, share * self._turn(t)
+
+
+@pytest.mark.parametrize("sides", [(1.0, -1.0), (1.0,), (1.0, 0.0, -1.0)])
+def test_wheels_at_their_limit_in_a_turn_are_not_weak_and_pull_to_no_side(
+    sides: tuple[float, ...], tmp_path: Path
+) -> None:
+    assert looked_at(Saturating(sides=sides), tmp_path).findings == ()
+
+
+def test_a_drive_that_never_was_faster_on_one_command_may_be_at_its_limit(tmp_path: Path) -> None:
+    class Slow(Drive):
+        def _move(self, speed: float, turn: float, *, onset: bool, failing: bool) -> None:
+            super()._move(0.6 * speed, turn, onset=onset, failing=failing)
+
+        def _odometry(self, t: float, speed: float, turn: float) -> Any:
+            return super()._odometry(t, 0.6 * speed, turn)
+
+    (finding,) = looked_at(Slow(), tmp_path).findings
+    assert (finding.title, finding.severity) == ("commands are beyond what the drive reaches", "info")

@@ -53,7 +53,7 @@ def _found(drive: Drive) -> tuple[Finding, ...]:
 
 
 def _with_fall(found: Iterable[Finding], fall: Fall | None) -> Iterator[Finding]:
-    """The findings, where what a fall brings about is not told to begin before it: samples do not tell which was first."""
+    """The findings, of which what a fall brings about begins after it: samples do not tell which was first."""
     for one in found:
         is_with = fall is not None and one.kind in EXPLAINS["crash"] and 0 <= fall.start_s - one.onset_s <= SLACK_S
         yield replace(one, onset_s=fall.start_s + _AFTER_S) if is_with and fall is not None else one

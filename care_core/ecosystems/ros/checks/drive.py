@@ -31,6 +31,9 @@ STOPS_IN_S = LIMITS.add("time in which they lie", 20.0, "s", f"97.5 % of {_HEALT
 STOPPED_S = LIMITS.add("time that they take together", 4.0, "s", f"97.5 % of {_HEALTHY}: 1.6 s")
 PULL_RADPM = LIMITS.add("turn beyond the commands", 0.12, "rad/m", f"none of {_HEALTHY} pulls so")
 PULL_SAMPLES = int(LIMITS.add("samples that pull", 25, "", f"with 20 one of {_HEALTHY} pulls, with 15 five"))
+PULL_OF_EACH = LIMITS.add("samples of commands to one side", 4, "", "fewer tell nothing of that side")
+PULL_ALIKE = LIMITS.add("share of the pull on commands to the other sides", 0.33, "", "a pull knows of no command")
+TURNS_RADPS = LIMITS.add("turn of a command that asks for one", 0.15, "rad/s", "less is steering straight on")
 PULL_AGREE = LIMITS.add("share of them that agree", 0.8, "", f"none of {_HEALTHY} pulls so")
 PULL_BEFORE = int(LIMITS.add("samples before that do not pull", 10, "", "a robot that always pulled is built so"))
 SLOWER = LIMITS.add("share of the commanded speed while it pulls", 0.97, "", "a slow side makes the robot slower, too")
@@ -43,6 +46,7 @@ RESTS_M = LIMITS.add("way in a standstill", 0.03, "m", "it stops and starts in i
 REPEATED = int(LIMITS.add("samples of a standstill of odometry alone", 4, "", "drivers repeat a pose 2 to 4 times"))
 KEEPS_UP = LIMITS.add("share of its speed that a robot keeps over a second", 0.7, "", "a stop of 0.3 s costs as much")
 LOST_S = LIMITS.add("pause between samples", 3.0, "s", "over a longer one nobody knows whether the robot stood")
+STRAIGHT_RADPS = LIMITS.add("turn of a command to go straight on", 0.5, "rad/s", "it takes a wheel 0.1 m/s at most")
 SLOW_LOST_S = LIMITS.add("pause between slow samples", 2.0, "s", "over a longer one nobody knows how fast it was")
 FASTER = LIMITS.add("ratio of speeds that shows a drive was not weak", 1.3, "", "clearly more than noise of odometry")
 LOAD = LIMITS.add("share of the driving current beyond idle", 0.5, "", "wheels that turn or push draw it")
@@ -55,6 +59,7 @@ MOSTLY = LIMITS.add("share of slow samples that stand", 0.5, "", "with more of t
 FOLLOWED = LIMITS.add("share of lower commands that it follows", 0.9, "", "a weak drive follows none")
 VARIED = LIMITS.add("spread of commands that tells of a limit", 1.5, "", "a choice: of one command none is told")
 LEVEL = LIMITS.add("spread of the speeds then", 1.35, "", "a weak drive gives a share of each command")
+ALWAYS = LIMITS.add("share of higher commands that it never reached", 0.9, "", "a drive that failed was faster before")
 LATER = LIMITS.add("samples that show a drive obeys", 10, "", "fewer are too few")
 OBEYS = LIMITS.add("share of them that stand", 0.1, "", "standing still for an instant, as at each turn")
 
@@ -245,9 +250,10 @@ def _keeps_up(motion: Following, span: tuple[float, float]) -> bool:
 
 
 def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:
-    """Moves, but slower than every command of the last second."""
+    """Moves, but slower than every command of the last second, straight on: wheels that turn it as well have less left."""
     odometry, wanted = motion.odometry, motion.wanted_speed
-    ordered = np.abs(wanted) >= BREAKS_LOOSE_MPS
+    turns = np.maximum(np.abs(motion.turn_low), np.abs(motion.turn_high))
+    ordered = (np.abs(wanted) >= BREAKS_LOOSE_MPS) & (turns <= STRAIGHT_RADPS)
     share = np.divide(odometry.speed, wanted, out=np.ones(len(wanted)), where=ordered)
     slow = (share < SLOW)[ordered]
     t = odometry.t[ordered]
@@ -260,7 +266,8 @@ def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:
     lower = demands < FOLLOWED * reached
     follows = np.count_nonzero(lower) >= LATER and float(median(share[ordered][lower])) > FOLLOWED
     is_level = _spread(demands[rows]) > VARIED and _spread(speeds[rows]) < LEVEL
-    if (follows or is_level) and odometry.fastest_mps < FASTER * reached:
+    is_always = float(slow[demands > FASTER * reached].mean()) >= ALWAYS
+    if (follows or is_level or is_always) and odometry.fastest_mps < FASTER * reached:
         yield _beyond(drive, (float(t[found[0][0]]), float(t[found[-1][1] - 1])), reached, demanded)
         return
     # It was weak since it last was clearly faster, though nobody could see that before a higher speed was commanded.
@@ -309,7 +316,8 @@ def _pulling(drive: Drive, motion: Following) -> Iterator[Finding]:
     if len(rows) < PULL_BEFORE + PULL_SAMPLES:
         return
     t, speed = odometry.t[rows], odometry.speed[rows]
-    pull: Floats = (odometry.turn[rows] - (motion.turn_high + motion.turn_low)[rows] / 2) / speed
+    ordered: Floats = (motion.turn_high + motion.turn_low)[rows] / 2
+    pull: Floats = (odometry.turn[rows] - ordered) / speed
     windows = sliding_window_view(pull, PULL_SAMPLES)[PULL_BEFORE:]
     shares = sliding_window_view(speed / motion.wanted_speed[rows], PULL_SAMPLES)[PULL_BEFORE:]
     middles = median(windows, axis=1)
@@ -317,6 +325,9 @@ def _pulling(drive: Drive, motion: Following) -> Iterator[Finding]:
     fits = (np.abs(middles) >= PULL_RADPM) & (agrees >= PULL_AGREE) & (median(shares, axis=1) < SLOWER)
     for number in np.flatnonzero(fits).tolist():
         first, middle = number + PULL_BEFORE, float(middles[number])
+        window = slice(first, first + PULL_SAMPLES)
+        if _falls_short(pull[window] * np.sign(middle), ordered[window] * np.sign(middle)):
+            continue
         if float(median(pull[:first])) * np.sign(middle) < PULL_RADPM / 2:
             # It began where the sum of what is beyond half of it turns upwards.
             above = np.cumsum(pull[: first + PULL_SAMPLES] * np.sign(middle) - abs(middle) / 2)
@@ -327,6 +338,20 @@ def _pulling(drive: Drive, motion: Following) -> Iterator[Finding]:
             side = "left" if middle > 0 else "right"
             yield _finding(drive, f"the drive pulls to the {side}", span, evidence, probability=0.8)
             return
+
+
+def _falls_short(pull: Floats, ordered: Floats) -> bool:
+    """Whether what seems to pull to one side only turns less than commanded: it does so against commands to turn to
+    either side, or against those to the other side alone.
+
+    Args:
+        pull: turn beyond the commands, rad/m, positive to the side that it seems to pull to.
+        ordered: commands to turn, rad/s, positive to that side.
+    """
+    sides = (pull[ordered > TURNS_RADPS], pull[ordered < -TURNS_RADPS], pull[np.abs(ordered) <= TURNS_RADPS])
+    with_it, against, straight = (float(median(one)) if len(one) >= PULL_OF_EACH else np.nan for one in sides)
+    pulls = [one > PULL_ALIKE * float(median(pull)) for one in (with_it, straight) if not np.isnan(one)]
+    return not np.isnan(against) and not (pulls and all(pulls))
 
 
 def _spaced(t: Floats, rows: NDArray[np.intp]) -> NDArray[np.intp]:
