@@ -559,3 +559,41 @@ def test_a_drive_that_never_was_faster_on_one_command_may_be_at_its_limit(tmp_pa
 
     (finding,) = looked_at(Slow(), tmp_path).findings
     assert (finding.title, finding.severity) == ("commands are beyond what the drive reaches", "info")
+
+
+def far_too_fast(message: Any, time_s: float) -> None:
+    if 19.9 < time_s < 20.7:
+        message.twist.twist.linear.x, message.twist.twist.angular.z = 37.0, -70.0
+
+
+def test_speeds_that_no_position_gives_are_told(tmp_path: Path) -> None:
+    (finding,) = looked_at(changed(ODOMETRY, far_too_fast), tmp_path).findings
+    assert (finding.title, finding.severity) == ("odometry tells impossible speeds", "warning")
+    assert finding.onset_s == pytest.approx(20.0, abs=0.2)
+    assert finding.evidence.startswith("4 of 200 messages: up to 37 m/s, its positions give 0.5 m/s at most, up to 70")
+
+
+class Silenced(Drive):
+    """Of which topics end, or pause, in a time: (topic's type, from, to)."""
+
+    silent: tuple[tuple[str, float, float], ...] = ()
+
+    def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+        for topic, name, time_s, message in super().messages():
+            if not any(name == kind and start <= time_s < end for kind, start, end in self.silent):
+                yield topic, name, time_s, message
+
+
+@pytest.mark.parametrize(("last_s", "told"), [(39.0, []), (30.0, ["it drives on without commands"])])
+def test_a_robot_that_drives_on_after_its_last_command_is_told(last_s: float, told: list[str], tmp_path: Path) -> None:
+    findings = looked_at(Silenced(silent=((TWIST, last_s, 99.0),)), tmp_path).findings
+    assert [one.title for one in findings] == told
+    assert all("it goes on for 10.0 s and 5.0 m, to the end of the recording" in one.evidence for one in findings)
+
+
+def test_a_robot_that_stops_after_its_last_command_is_fine(tmp_path: Path) -> None:
+    class Stops(Silenced):
+        def _driven(self, t: float, speed: float, turn: float) -> tuple[float, float]:
+            return (speed, turn) if t < FAILS_AT_S + 0.6 else (0.0, 0.0)
+
+    assert looked_at(Stops(silent=((TWIST, FAILS_AT_S, 99.0),)), tmp_path).findings == ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros.messages import FRAME, HEIGHT, ODOMETRY, TWIST, TWIST_STAMPED, believable, tilt_of, yaw_of
@@ -92,13 +93,34 @@ class Odometry(Record, eq=False):
         """The greatest speed that lasts: as its twist says, and no more than its position went in a second, where it
         tells one. A twist that is made of single steps of an encoder has spikes."""
         spoken = quantile(np.abs(self.speed), _NEARLY_ALL)
+        rows, later = self._seconds
+        if self.stands_still or not len(rows):
+            return spoken
+        return min(spoken, quantile(self._rate(rows, later, self.x, self.y), _NEARLY_ALL))
+
+    @property
+    def most_by_position(self) -> tuple[float, float]:
+        """The greatest speed and turn that its poses give over a second, m/s and rad/s; of one that holds no second
+        without a pause none are known, and nothing is beyond them."""
+        rows, later = self._seconds
+        if not len(rows):
+            return np.inf, np.inf
+        yaw = np.unwrap(self.yaw)
+        return float(self._rate(rows, later, self.x, self.y).max()), float(self._rate(rows, later, yaw).max())
+
+    @property
+    def _seconds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows from which about a second passes without a long pause, and the rows at its end."""
         later = np.minimum(np.searchsorted(self.clock, self.clock + _A_SECOND), len(self.clock) - 1)
         apart = self.clock[later] - self.clock
-        whole = (apart >= _A_SECOND) & (apart < 2 * _A_SECOND)
-        if self.stands_still or not whole.any():
-            return spoken
-        went = np.hypot(self.x[later] - self.x, self.y[later] - self.y)[whole] / apart[whole]
-        return min(spoken, quantile(went, _NEARLY_ALL))
+        rows = np.flatnonzero((apart >= _A_SECOND) & (apart < 2 * _A_SECOND))
+        return rows, later[rows]
+
+    def _rate(self, rows: NDArray[np.intp], later: NDArray[np.intp], *columns: Floats) -> Floats:
+        """How fast these change between rows, per second."""
+        went = np.sqrt(sum((column[later] - column[rows]) ** 2 for column in columns))
+        rate: Floats = went / (self.clock[later] - self.clock[rows])
+        return rate
 
     def spread_m(self, start_s: float) -> float:
         """Diagonal of the area that its positions lie in from a time on, m."""

@@ -11,12 +11,20 @@ from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity, SuspectKind
-from care_core.ecosystems.ros.drive import Drive
+from care_core.ecosystems.ros.drive import FEWEST_COMMANDS, Drive
 from care_core.ecosystems.ros.messages import BATTERY, COMMANDS, GOALS, ODOMETRY, reading
-from care_core.ecosystems.ros.motion import ANSWER_S, BREAKS_LOOSE_MPS, Following
+from care_core.ecosystems.ros.motion import (
+    ANSWER_S,
+    BREAKS_LOOSE_MPS,
+    BREAKS_LOOSE_RADPS,
+    STALE_S,
+    Following,
+    Odometry,
+)
 from care_core.ecosystems.ros.sensors import Battery
 from care_core.numbers import Bools, Floats, known_median, median, quantile
 from care_core.records import replace
+from care_core.text import log_time
 
 LIMITS = Limits()
 _HEALTHY = "301 healthy move_base missions"
@@ -45,6 +53,8 @@ PULL_DRIVEN_MPS = LIMITS.add("speed while it pulls", 0.05, "m/s", "slower, noise
 RESTS_M = LIMITS.add("way in a standstill", 0.03, "m", "it stops and starts in it")
 REPEATED = int(LIMITS.add("samples of a standstill of odometry alone", 4, "", "drivers repeat a pose 2 to 4 times"))
 KEEPS_UP = LIMITS.add("share of its speed that a robot keeps over a second", 0.7, "", "a stop of 0.3 s costs as much")
+GOES_ON_S = LIMITS.add("time that it drives on", 1.5, "s", "drivers stop after 0.5 s, and it takes a second to stand")
+GOES_ON = LIMITS.add("share of its speed that it keeps", 0.6, "", "less is coming to a stop")
 LOST_S = LIMITS.add("pause between samples", 3.0, "s", "over a longer one nobody knows whether the robot stood")
 STRAIGHT_RADPS = LIMITS.add("turn of a command to go straight on", 0.5, "rad/s", "it takes a wheel 0.1 m/s at most")
 SLOW_LOST_S = LIMITS.add("pause between slow samples", 2.0, "s", "over a longer one nobody knows how fast it was")
@@ -67,6 +77,7 @@ OBEYS = LIMITS.add("share of them that stand", 0.1, "", "standing still for an i
 def find(drive: Drive) -> Iterator[Finding]:
     """Commands that are none, standstills against commands, short and long, weakness, and a pull to one side."""
     yield from _numberless(drive)
+    yield from _uncommanded(drive)
     motion = drive.following
     if motion is None:
         return
@@ -144,6 +155,48 @@ def _numberless(drive: Drive) -> Iterator[Finding]:
         suspect="operation",
         probability=0.8,
     )
+
+
+def _uncommanded(drive: Drive) -> Iterator[Finding]:
+    """The robot goes on as it was last commanded to, long after that command."""
+    odometry, commands = drive.odometry, drive.commands
+    if odometry is None or commands is None or not odometry.tells_speed or len(commands.t) < FEWEST_COMMANDS:
+        return
+    last_s = float(commands.t[-1])
+    if any(float(table.t[-1]) > last_s for topic, table in drive.of(*COMMANDS) if topic != commands.topic):
+        return
+    later = odometry.where((odometry.t > last_s + STALE_S) & (odometry.recorded_s > last_s))
+    count = _goes_on(later, odometry, float(commands.speed[-1]), float(commands.turn[-1]))
+    if not count or later.clock[count - 1] - later.clock[0] < GOES_ON_S - STALE_S:
+        return
+    end_s = float(later.t[count - 1])
+    went_m, turned = odometry.path_m(last_s, end_s), float(np.ptp(np.unwrap(later.yaw[:count])))
+    way = f"{went_m:.1f} m" if abs(commands.speed[-1]) >= BREAKS_LOOSE_MPS else f"{np.degrees(turned):.0f} deg of turn"
+    until = "to the end of the recording" if count == len(later.t) else f"until {log_time(end_s)}"
+    yield Finding(
+        kind="commands",
+        title="it drives on without commands",
+        onset_s=last_s,
+        end_s=end_s,
+        severity="warning",
+        evidence=f"the last on {commands.topic} is of {log_time(last_s)}; it goes on for {end_s - last_s:.1f} s and"
+        f" {way}, {until}: its base has no time-out for commands, or a topic that is not recorded commands it",
+        source=f"{odometry.topic} against {commands.topic}",
+        suspect="operation",
+        probability=0.7,
+    )
+
+
+def _goes_on(later: Odometry, odometry: Odometry, speed: float, turn: float) -> int:
+    """Samples in a row in which it does what it was last commanded to, as far as it ever does; 0 where it was to stand."""
+    goes_on, is_to_move = np.ones(len(later.t), bool), False
+    parts = (speed, BREAKS_LOOSE_MPS, "speed"), (turn, BREAKS_LOOSE_RADPS, "turn")
+    for wanted, least, name in parts:
+        if abs(wanted) >= least:
+            most = min(abs(wanted), quantile(np.abs(getattr(odometry, name)), 0.9))
+            goes_on &= getattr(later, name) * np.sign(wanted) >= GOES_ON * max(most, least)
+            is_to_move = True
+    return int(np.argmin(np.append(goes_on, False))) if is_to_move else 0
 
 
 def _stood(motion: Following) -> Bools:
@@ -250,7 +303,7 @@ def _keeps_up(motion: Following, span: tuple[float, float]) -> bool:
 
 
 def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:
-    """Moves, but slower than every command of the last second, straight on: wheels that turn it as well have less left."""
+    """Moves, but slower than every command of the last second, straight on: turning takes a share of its wheels."""
     odometry, wanted = motion.odometry, motion.wanted_speed
     turns = np.maximum(np.abs(motion.turn_low), np.abs(motion.turn_high))
     ordered = (np.abs(wanted) >= BREAKS_LOOSE_MPS) & (turns <= STRAIGHT_RADPS)

@@ -23,6 +23,10 @@ LIMITS = Limits()
 _HEALTHY = "301 healthy move_base missions"
 _DRIFT = f"{_HEALTHY}: 97.5 % stay below"
 _WAY = "a drift shows over more than the noise of a step, or sooner where it is strong"
+BEYOND = LIMITS.add("speed against the most that positions give", 5.0, "", "a choice: no filter, no slip makes it")
+JUMPS_MPS = LIMITS.add("speed beyond that", 2.0, "m/s", "a choice: spikes of a coarse encoder are less")
+JUMPS_RADPS = LIMITS.add("turn beyond that", 6.0, "rad/s", "a choice: spikes of a coarse encoder are less")
+BUNCHED = LIMITS.add("step of stamps in a bunch, of the usual one", 0.05, "", "what is divided by it grows as much")
 JUMP_M = LIMITS.add("step beyond what speed and time allow", 0.3, "m", f"{_HEALTHY}: at most 0.07 m")
 JUMP_AT_REST_M = LIMITS.add("the same of a robot that stands", 0.15, "m", f"{_HEALTHY}: at most 0.07 m of any")
 DRIFTS = (
@@ -56,6 +60,8 @@ def find(drive: Drive) -> Iterator[Finding]:
     """Odometry that cannot be, that jumps or drifts, and a localisation that jumps."""
     odometry = drive.odometry
     yield from _unusable(drive)
+    if odometry is not None and not odometry.stands_still:
+        yield from _impossible(drive, odometry)
     if odometry is not None and odometry.tells_speed and not odometry.stands_still:
         yield from _jumps(drive, odometry)
         yield from _drift(drive, odometry)
@@ -100,6 +106,45 @@ def _doubts(drive: Drive) -> Iterator[tuple[str, str, str]]:
     if len(stamp) >= STREAM_MESSAGES and (not len(known) or (len(known) == len(stamp) and np.ptp(known) == 0)):
         stamps = "are the same" if len(known) else "were never set"
         yield topic, "odometry has no time stamps", f"its {len(stamp)} stamps {stamps}; transforms need them"
+
+
+def _impossible(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
+    """Speeds that are many times what its positions ever give over a second."""
+    table = dict(drive.of(ODOMETRY))[odometry.topic]
+    names = [f"twist.twist.{name}" for name in ("linear.x", "linear.y", "angular.z")]
+    forward, aside, turn = (np.asarray(table[name], np.float64) for name in names)
+    with np.errstate(over="ignore", invalid="ignore"):
+        told = ((np.hypot(forward, aside), JUMPS_MPS, "m/s"), (np.abs(turn), JUMPS_RADPS, "rad/s"))
+        most = odometry.most_by_position
+        rolls = ~inside(_pushed(drive), table.t)
+        bad = [
+            rolls & (speeds > np.maximum(BEYOND * known, known + extra))
+            for (speeds, extra, _), known in zip(told, most, strict=True)
+        ]
+    rows = np.flatnonzero(bad[0] | bad[1])
+    if not len(rows):
+        return
+    words = [
+        f"up to {speeds[where].max():.3g} {unit}, its positions give {known:.1f} {unit} at most"
+        for (speeds, _, unit), known, where in zip(told, most, bad, strict=True)
+        if where.any()
+    ]
+    bunched = "; its stamps come in bunches" if _in_bunches(odometry) else ""
+    yield Finding(
+        kind="localisation",
+        title="odometry tells impossible speeds",
+        onset_s=float(table.t[rows[0]]),
+        end_s=float(table.t[rows[-1]]),
+        severity="warning",
+        evidence=f"{len(rows)} of {len(table)} messages: {', '.join(words)}{bunched}",
+        source=f"{odometry.topic}: twist against position",
+        probability=0.9,
+    )
+
+
+def _in_bunches(odometry: Odometry) -> bool:
+    steps = np.diff(odometry.clock)
+    return len(steps) > STREAM_MESSAGES and quantile(steps, 0.02) < BUNCHED * float(median(steps))
 
 
 def _is_nothing(table: Table) -> bool:

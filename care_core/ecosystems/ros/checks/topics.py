@@ -44,7 +44,7 @@ LIMITS.add("silence of a stream that has ended", SILENT_S, "s", _LOADED)
 LIMITS.add("silence of a stream in its periods", SILENT_PERIODS, "", _LOADED)
 _QOS = re.compile(r"incompatible qos", re.IGNORECASE)
 _TOPIC = re.compile(r"topic '?\"?([\w/~]+)")
-_KINDS: dict[str, FindingKind] = {ODOMETRY: "localisation", IMU: "imu", BATTERY: "battery"}
+_KINDS: dict[str, FindingKind] = {ODOMETRY: "topics", IMU: "imu", BATTERY: "battery"}
 _JUDGED_ELSEWHERE = (SCAN, CLOUD, *COMMANDS, STATUS)
 
 
