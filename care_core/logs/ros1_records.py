@@ -190,6 +190,7 @@ def _take_connection(buffer: Source, record: _Record, contents: BagContents) -> 
         topic=_normal(record.fields.get(b"topic", b"").decode("utf-8", "replace")),
         type=described.get(b"type", b"").decode("utf-8", "replace"),
         definition=described.get(b"message_definition", b"").decode("utf-8", "replace"),
+        publisher=described.get(b"callerid", b"").decode("utf-8", "replace"),
     )
 
 

@@ -62,6 +62,8 @@ class Connection(Record):
     """How messages are serialised: `ros1` and `cdr` are decoded."""
     language: str = ""
     """What the definition is written in, where there is a choice: `ros2msg` or `ros2idl`."""
+    publisher: str = ""
+    """The node that sends it; empty where the recording does not say."""
 
 
 class Flaw(Record):
@@ -237,6 +239,14 @@ class RosLog:
                     own.append(self._kept(part.times_ns[number]))
         none = np.empty(0, np.int64)
         return {topic: (np.sort(np.concatenate([none, *own])) - self._low_ns) / 1e9 for topic, own in found.items()}
+
+    def publishers(self) -> Mapping[str, frozenset[str]]:
+        """Per topic the nodes that send it; none where the recording does not say."""
+        found: dict[str, set[str]] = {}
+        for part in self._parts:
+            for connection in part.connections.values():
+                found.setdefault(connection.topic, set()).update({connection.publisher} - {""})
+        return {topic: frozenset(nodes) for topic, nodes in found.items()}
 
     def read(self, wanted: Wanted, at_most: Mapping[str, int] | None = None) -> Mapping[str, Table]:
         """Decode the wanted fields in one pass; see the class for times, `compile_decoder` for values.

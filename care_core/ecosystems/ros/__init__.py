@@ -47,6 +47,7 @@ class Ros(Ecosystem):
         "care_core.ecosystems.ros.measures.laser",
         "care_core.ecosystems.ros.measures.nav2",
         "care_core.ecosystems.ros.measures.navigation",
+        "care_core.ecosystems.ros.measures.posed",
         "care_core.ecosystems.ros.measures.requested",
     )
 
@@ -77,6 +78,11 @@ class Ros(Ecosystem):
             yield {"kind": "nav2_goals", "goal_timeout_s": _PATIENCE_S}
         for action in _nav2_actions(channels):
             yield {"kind": "nav2_goals", "action": action, "goal_timeout_s": _PATIENCE_S}
+        from care_core.ecosystems.ros.posed_goals import section_of
+
+        posed = section_of(channels)
+        if posed is not None:
+            yield {**posed, "goal_timeout_s": _PATIENCE_S}
 
     def messages(self) -> Dictionary:
         from care_core.ecosystems.ros.messages import MESSAGES

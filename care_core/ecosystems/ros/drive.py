@@ -45,6 +45,7 @@ from care_core.ecosystems.ros.motion import Commands, Following, Odometry, comma
 from care_core.ecosystems.ros.namespaces import is_of, robot_namespaces
 from care_core.ecosystems.ros.node_messages import LogMessage, Report, faults, log_messages, reports
 from care_core.ecosystems.ros.plugin_names import created
+from care_core.ecosystems.ros.posed_goals import posed_goals, section_of
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
 from care_core.numbers import Floats, median, quantile
@@ -341,6 +342,11 @@ class Drive(RunModel):
     # Goals
 
     @cached_property
+    def posed(self) -> Mapping[str, Any] | None:
+        """Where goals are told that no action tells of, as a mission section."""
+        return section_of(self.channels)
+
+    @cached_property
     def goals(self) -> tuple[Goal, ...]:
         """Every goal of the recording's driving actions, in the order sent; of all its actions where none drives."""
         results = {topic.rpartition("/")[0]: table for topic, table in self.of(ACTION_RESULT)}
@@ -353,6 +359,8 @@ class Drive(RunModel):
         ]
         for topic, table in tables.items():
             found += nav2_goals({topic.removesuffix(STATUS_TOPIC): table}, self.duration_s)
+        if not found and self.posed is not None:
+            return posed_goals(self, self.posed)
         driving = [goal for goal in found if goal.drives]
         return tuple(sorted(driving or found, key=lambda goal: goal.sent_s))
 

@@ -13,7 +13,7 @@ from care_core.ecosystems.ros.messages import ACTION_RESULT, MESSAGES, STATUS, h
 from care_core.logs.base import Table
 from care_core.records import Record, Struct, replace
 
-Outcome = Literal["reached", "cancelled", "aborted", "rejected", "lost", "replaced", ""]
+Outcome = Literal["reached", "cancelled", "aborted", "rejected", "lost", "not reached", "replaced", ""]
 """How a goal ended; empty where the recording does not say."""
 
 STATUS_TOPIC = "/_action/status"
@@ -23,7 +23,7 @@ _DRIVES = ("navigate", "move_base")
 
 
 class Status(IntEnum):
-    """How a goal ended, in the codes of actionlib_msgs/GoalStatus."""
+    """How a goal ended, in the codes of actionlib_msgs/GoalStatus, and one for what no action tells."""
 
     PREEMPTED = 2
     SUCCEEDED = 3
@@ -31,6 +31,8 @@ class Status(IntEnum):
     REJECTED = 5
     RECALLED = 8
     LOST = 9
+    NOT_REACHED = 100
+    """By where the robot is."""
 
 
 _OUTCOMES: Mapping[int, Outcome] = {
@@ -40,7 +42,10 @@ _OUTCOMES: Mapping[int, Outcome] = {
     Status.REJECTED: "rejected",
     Status.RECALLED: "cancelled",
     Status.LOST: "lost",
+    Status.NOT_REACHED: "not reached",
 }
+FAILED = (Status.ABORTED, Status.REJECTED, Status.LOST, Status.NOT_REACHED)
+"""How goals end that the robot did not reach though nobody took them back."""
 _SAME_M = 0.05
 """Goals that lie no farther apart are the same place."""
 _ROS2 = {4: Status.SUCCEEDED, 5: Status.PREEMPTED, 6: Status.ABORTED}

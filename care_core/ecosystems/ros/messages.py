@@ -7,6 +7,7 @@ read, and of sensors that send often as many messages as a look at them needs: a
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -37,6 +38,7 @@ RECOVERY = "move_base_msgs/RecoveryStatus"
 TRANSITION = "lifecycle_msgs/TransitionEvent"
 TF = ("tf2_msgs/TFMessage", "tf/tfMessage")
 LOCALISED = "geometry_msgs/PoseWithCovarianceStamped"
+POSE, PATH = "geometry_msgs/PoseStamped", "nav_msgs/Path"
 NAVIGATION = "nav2_msgs/NavigateToPose_FeedbackMessage"
 ACTION_GOAL, ACTION_RESULT = "ActionGoal", "ActionResult"
 """How the types of a ROS 1 action's goals and results end."""
@@ -63,10 +65,18 @@ AT_TIMES = (
     FAULT_EVENT,
     RECOVERY,
     TRANSITION,
-    "nav_msgs/Path",
-    "geometry_msgs/PoseStamped",
+    PATH,
+    POSE,
 )
 """Types that are sent only while there is something to say: commands while somebody commands, poses that were found."""
+
+_OF_EVENTS = (PATH, "std_msgs/Empty", "geometry_msgs/PointStamped")
+_OF_EVENTS_BEGIN = ("visualization_msgs/InteractiveMarker",)
+_EVENTS = re.compile(
+    r"goal|clicked|initial_?pose|interactive|rviz|event|bumper|contact|collision|feedback$|teleop|keyboard",
+    re.IGNORECASE,
+)
+"""In the names of topics that speak only when something happens, or somebody does something."""
 
 FRAME = "header.frame_id"
 """The frame in which a message gives places: text, so read only where places are compared."""
@@ -169,7 +179,7 @@ MESSAGES: Mapping[str, RosMessage] = {
     NAVIGATION: RosMessage({"feedback.distance_remaining": _number("m", "distance to the goal", _FAR_M)}),
     ACTION_RESULT: _reads("status.goal_id.id", "status.status", "status.text"),
     LOCALISED: RosMessage(_POSE, reads=tuple(_POSE), at_most=20_000, label="poses"),
-    **dict.fromkeys(("geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped"), _reads(label="poses")),
+    **dict.fromkeys((POSE, "geometry_msgs/TransformStamped"), _reads(label="poses")),
     "sensor_msgs/NavSatFix": _reads(label="satellite positions"),
     **dict.fromkeys(("sensor_msgs/Image", "sensor_msgs/CompressedImage"), _reads(label="images")),
     CLOUD: _reads(label="point clouds"),
@@ -193,6 +203,15 @@ def type_of(channel: Channel) -> str:
 def speaks_at_times(type: str) -> bool:
     """Whether a type's silence is no hole."""
     return type in AT_TIMES or type in WITHOUT_STREAM
+
+
+def tells_events(channel: Channel) -> bool:
+    """Whether a topic speaks when something happens: how often it does, and that it stops, says nothing of a fault."""
+    type = type_of(channel)
+    is_such = type in _OF_EVENTS or type in WITHOUT_STREAM or type.startswith(_OF_EVENTS_BEGIN)
+    return (
+        is_such or (type in AT_TIMES and type not in (*COMMANDS, POSE, LOCALISED)) or bool(_EVENTS.search(channel.name))
+    )
 
 
 def holds(table: Table, type: str) -> bool:

@@ -17,6 +17,8 @@ BREAKS_LOOSE_MPS, BREAKS_LOOSE_RADPS = 0.08, 0.15
 """A command for less may be too little to break loose, so a robot that stands still then does not disobey."""
 TWIST_MPS, TWIST_RADPS = 0.01, 0.01
 """An odometry that ever tells more than these has its twist filled in: some drivers leave it zero."""
+ELSEWHERE_M = 0.5
+"""What is so far from where it was has moved, where no speed is told: positions of satellites wander by less."""
 STILL_M = 2.0
 """Way by its speed that no noise of a speed makes while a position stays the same to the last digit."""
 
@@ -97,6 +99,13 @@ class Odometry(Record, eq=False):
         if self.stands_still or not len(rows):
             return spoken
         return min(spoken, quantile(self._rate(rows, later, self.x, self.y), _NEARLY_ALL))
+
+    @property
+    def moves(self) -> Bools:
+        """Where it does not stand, by its speed; where it tells none, where it is elsewhere than at first."""
+        if self.tells_speed:
+            return np.asarray((np.abs(self.speed) > STANDS_MPS) | (np.abs(self.turn) > STANDS_RADPS))
+        return np.asarray(np.hypot(self.x - self.x[0], self.y - self.y[0]) > ELSEWHERE_M)
 
     @property
     def most_by_position(self) -> tuple[float, float]:
@@ -278,6 +287,29 @@ def following(odometry: Odometry, commands: Commands) -> Following:
             bound[row] = value
         to_move[row] = moving[second].all()
     return Following(odometry, commanded, to_move, *bounds)
+
+
+class Poses(Record, eq=False):
+    """Poses of the robot in a frame: s, m, rad, all shape (n,)."""
+
+    t: Floats
+    x: Floats
+    y: Floats
+    yaw: Floats
+    frame: str
+
+
+def moved_to(poses: Poses, t: Floats, x: Floats, y: Floats, yaw: Floats) -> tuple[Floats, Floats, Floats]:
+    """Odometry, shape (n,), moved to the last pose that was told before each sample, the first one before it."""
+    rows = np.interp(poses.t, t, np.arange(len(t))).round().astype(np.intp)
+    at = np.clip(np.searchsorted(poses.t, t, side="right") - 1, 0, None)
+    off = poses.yaw[at] - yaw[rows[at]]
+    dx, dy = x - x[rows[at]], y - y[rows[at]]
+    return (
+        poses.x[at] + np.cos(off) * dx - np.sin(off) * dy,
+        poses.y[at] + np.sin(off) * dx + np.cos(off) * dy,
+        yaw + off,
+    )
 
 
 def stretches(t: Floats, condition: Bools, gap_s: float) -> list[tuple[float, float]]:

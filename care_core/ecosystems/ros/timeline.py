@@ -20,6 +20,7 @@ from care_core.ecosystems.ros.messages import (
     DIAGNOSTICS,
     FAULT_EVENT,
     GOALS,
+    LOCALISED,
     ODOMETRY,
     RECOVERY,
     ROSOUT,
@@ -28,8 +29,10 @@ from care_core.ecosystems.ros.messages import (
     WITHOUT_STREAM,
     holds,
     reading,
+    tells_events,
+    type_of,
 )
-from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS
+from care_core.ecosystems.ros.motion import Odometry
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, level_word
 from care_core.ecosystems.ros.other_robots import other_goals
 from care_core.ecosystems.ros.recoveries import announced, repairs
@@ -42,6 +45,8 @@ _GOALS, _MESSAGES, _REPORTS, _CHANGES, _CONTACTS = 12, 14, 6, 5, 6
 """Lines of each sort at most."""
 PAUSE_S, PAUSE_PERIODS = 3.0, 10.0
 """A stream that pauses so long, and so many of its periods, is told of."""
+STOOD_M = 0.5
+"""A robot that comes no farther has not moved enough for a localisation to say so: amcl's update_min_d is 0.25 m."""
 SLOWER, SLOWER_S = 0.5, 10.0
 """A stream whose rate falls below this share of what it was, for so long, is told of."""
 _TEXT = 110
@@ -90,6 +95,9 @@ def _damage(drive: Drive) -> Iterator[Event]:
 
 def _goals(drive: Drive) -> Iterator[Event]:
     goals = drive.goals
+    if goals and drive.posed is not None:
+        words = f"goals are told by {goals[0].action} alone: how they ended is judged by where the robot is"
+        yield Event(goals[0].sent_s, "goal", words, goals[0].action)
     shown = goals if len(goals) <= _GOALS else [goal for goal in goals if goal.outcome != "reached"][:_GOALS]
     for number, goal in enumerate(goals, start=1):
         if goal not in shown:
@@ -152,18 +160,21 @@ def _pauses(drive: Drive) -> Iterator[Event]:
     """Streams that pause, end early, or become slower; those that do so together in one line."""
     paused: dict[tuple[int, int], list[str]] = {}
     for channel in drive.channels:
-        if channel.name not in drive.streams or short_name(channel.type) in WITHOUT_STREAM:
+        if channel.name not in drive.streams or tells_events(channel):
             continue
         times = drive.times[channel.name]
         pauses = np.diff(times)
         usual = drive.streams[channel.name]
         row = int(np.argmax(pauses))
         over = drive.ends_early(channel.name)
+        if type_of(channel) == LOCALISED:  # it tells a pose where the robot has moved
+            over = over if over and drive.moved_between(over[0], drive.duration_s) > STOOD_M else None
+            pauses = pauses if drive.moved_between(times[row], times[row + 1]) > STOOD_M else pauses[:0]
         if over is not None:
             yield Event(over[0], "topic", f"{channel.name} ends; {1 / usual:.3g} Hz before", channel.name)
-        if pauses[row] >= max(PAUSE_S, PAUSE_PERIODS * usual):
+        if len(pauses) and pauses[row] >= max(PAUSE_S, PAUSE_PERIODS * usual):
             paused.setdefault((round(times[row] / 2), round(times[row + 1] / 2)), []).append(channel.name)
-        else:
+        elif len(pauses):
             yield from _slower(channel.name, times, usual)
     for names in paused.values():
         first = drive.times[names[0]]
@@ -238,20 +249,28 @@ def _changes(drive: Drive) -> Iterator[Event]:
 
 def _motion(drive: Drive) -> Iterator[Event]:
     odometry = drive.odometry
+    if odometry is not None and drive.fall is not None:  # how it tumbles is no driving
+        odometry = odometry.where(odometry.t < drive.fall.start_s)
     if odometry is not None:
-        rows = np.flatnonzero((np.abs(odometry.speed) > STANDS_MPS) | (np.abs(odometry.turn) > STANDS_RADPS))
+        rows = np.flatnonzero(odometry.moves)
         end_s = float(odometry.t[-1])
         if not len(rows):
             yield Event(end_s, "motion", "the robot never moved", odometry.topic)
         else:
             began_s = max(0.0, float(odometry.t[rows[0]]))  # by its own stamp, which may lie before the recording
             yield Event(began_s, "motion", "the robot moves for the first time", odometry.topic)
-            went = odometry.way_by_speed_m if odometry.stands_still else odometry.path_m()
-            words = f"drove {went:.1f} m in all, {odometry.fastest_mps:.2f} m/s at most"
-            yield Event(end_s, "motion", words, odometry.topic)
+            yield Event(end_s, "motion", _driven(odometry), odometry.topic)
     for battery in drive.batteries:
         words = f"battery {battery.voltage[0]:.1f} V at first, {battery.voltage[-1]:.1f} V at last"
         yield Event(float(battery.t[-1]), "battery", f"{words}, {battery.voltage.min():.1f} V at least", battery.topic)
+
+
+def _driven(odometry: Odometry) -> str:
+    """How far and how fast it went; positions alone, such as a receiver's, wander too much to be added up."""
+    if not odometry.tells_speed:
+        return f"its positions lie within {odometry.spread_m(0.0):.1f} m; its odometry tells no speed"
+    went = odometry.way_by_speed_m if odometry.stands_still else odometry.path_m()
+    return f"drove {went:.1f} m in all, {odometry.fastest_mps:.2f} m/s at most"
 
 
 def _times(count: int, last_s: float) -> str:

@@ -188,7 +188,7 @@ def _uncommanded(drive: Drive) -> Iterator[Finding]:
 
 
 def _goes_on(later: Odometry, odometry: Odometry, speed: float, turn: float) -> int:
-    """Samples in a row in which it does what it was last commanded to, as far as it ever does; 0 where it was to stand."""
+    """Samples in a row in which it does what it was last commanded to, as far as it ever does; 0 of a stop."""
     goes_on, is_to_move = np.ones(len(later.t), bool), False
     parts = (speed, BREAKS_LOOSE_MPS, "speed"), (turn, BREAKS_LOOSE_RADPS, "turn")
     for wanted, least, name in parts:

@@ -15,7 +15,7 @@ import numpy as np
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import Args, Mission, MissionKind, numeric, points
 from care_core.ecosystems.ros.drive import BATTERY_FIELDS, COMMAND_FIELDS, LOG_FIELDS, ODOMETRY_FIELDS, Drive
-from care_core.ecosystems.ros.goals import Goal, Status
+from care_core.ecosystems.ros.goals import FAILED, Goal, Status
 from care_core.ecosystems.ros.measures.window import (
     TOLERANCE_M,
     ActiveCommands,
@@ -123,7 +123,7 @@ class GoalMissions(MissionKind):
         drive = mission.shared(window)
         goals = drive.goals
         reached = sum(goal.status == Status.SUCCEEDED for goal in goals)
-        failed = sum(goal.status in (Status.ABORTED, Status.REJECTED, Status.LOST) for goal in goals)
+        failed = sum(goal.status in FAILED for goal in goals)
         word = f"{reached} of {len(goals)} goals were reached"
         value: Value = 1.0 if reached else Unavailable(f"{word}, the others were cancelled or left open")
         if failed:
@@ -178,8 +178,8 @@ def _failed_goals(mission: Mission) -> Iterator[Evidence]:
     drive = mission.shared(window)
     for number, goal in enumerate(drive.goals, start=1):
         why = f": {goal.text}" if goal.text else ""
-        if goal.status in (Status.ABORTED, Status.REJECTED, Status.LOST):
-            word = Status(goal.status).name.lower()
+        if goal.status in FAILED:
+            word = Status(goal.status).name.lower().replace("_", " ")
             yield Evidence(goal.end_s, f"goal {number} {word} after {goal.time_s:.0f} s{why}", "abort")
         elif goal.time_s > drive.timeout_s:
             yield Evidence(goal.end_s, f"goal {number} not reached within {drive.timeout_s:.0f} s{why}", "timeout")

@@ -16,9 +16,11 @@ from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, nav2_goals, sent_again
 from care_core.ecosystems.ros.measures.goals import GoalMissions
 from care_core.ecosystems.ros.measures.requested import PER_GOAL, PER_METRE, divided
-from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer, Poses, window
+from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer, window
 from care_core.ecosystems.ros.messages import FRAME, MESSAGES, STATUS, TREE, holds, yaw_of
+from care_core.ecosystems.ros.motion import Poses
 from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS
+from care_core.ecosystems.ros.posed_goals import PLAN_FIELDS, POSE_FIELDS
 from care_core.ecosystems.ros.recoveries import Recoveries, changes, repairs
 from care_core.logs.base import Table, Wanted
 from care_core.records import replace
@@ -27,21 +29,7 @@ from care_core.run import Unavailable, Value
 KIND = "nav2_goals"
 ACTIONS = ("/navigate_to_pose", "/navigate_through_poses")
 
-POSE_FIELDS = (
-    FRAME,
-    "pose.position.x",
-    "pose.position.y",
-    *(f"pose.orientation.{axis}" for axis in "xyzw"),
-)
 _POSES = "poses.pose"
-PLAN_FIELDS = (
-    FRAME,
-    f"{_POSES}.position.x",
-    f"{_POSES}.position.y",
-    f"{_POSES}.orientation.z",
-    f"{_POSES}.orientation.w",
-)
-
 _PLACE = "feedback.current_pose"
 FEEDBACK_FIELDS = tuple(f"{_PLACE}.{field}" for field in POSE_FIELDS)
 

@@ -22,6 +22,8 @@ from care_core.ecosystems.ros.motion import (
     STANDS_RADPS,
     Commands,
     Odometry,
+    Poses,
+    moved_to,
     never_moved,
     stretches,
 )
@@ -102,16 +104,6 @@ def time_limit_s(goals: Sequence[Goal], spec: Args) -> float:
     listed_m = max(math.dist(a, b) for a, b in pairwise(listed))
     apart_m = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(goals)]
     return timeout_s(spec) * max([1.0, *(apart / listed_m for apart in apart_m if math.isfinite(apart))])
-
-
-class Poses(Record, eq=False):
-    """Poses of the robot in a frame: s, m, rad, all shape (n,)."""
-
-    t: Floats
-    x: Floats
-    y: Floats
-    yaw: Floats
-    frame: str
 
 
 class GoalServer(Record):
@@ -310,17 +302,8 @@ def _placed(odometry: ActiveOdometry, poses: Poses | None) -> ActiveOdometry | N
     """The odometry moved to the last pose that was told before each sample, the first one before it."""
     if poses is None or poses.frame.strip("/") == odometry.frame.strip("/"):
         return None
-    rows = np.interp(poses.t, odometry.t, np.arange(len(odometry.t))).round().astype(np.intp)
-    at = np.clip(np.searchsorted(poses.t, odometry.t, side="right") - 1, 0, None)
-    off = poses.yaw[at] - odometry.yaw[rows[at]]
-    dx, dy = odometry.x - odometry.x[rows[at]], odometry.y - odometry.y[rows[at]]
-    return replace(
-        odometry,
-        x=poses.x[at] + np.cos(off) * dx - np.sin(off) * dy,
-        y=poses.y[at] + np.sin(off) * dx + np.cos(off) * dy,
-        yaw=odometry.yaw + off,
-        frame=poses.frame,
-    )
+    x, y, yaw = moved_to(poses, odometry.t, odometry.x, odometry.y, odometry.yaw)
+    return replace(odometry, x=x, y=y, yaw=yaw, frame=poses.frame)
 
 
 def _doubt(
