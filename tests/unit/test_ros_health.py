@@ -597,3 +597,82 @@ def test_a_robot_that_stops_after_its_last_command_is_fine(tmp_path: Path) -> No
             return (speed, turn) if t < FAILS_AT_S + 0.6 else (0.0, 0.0)
 
     assert looked_at(Stops(silent=((TWIST, FAILS_AT_S, 99.0),)), tmp_path).findings == ()
+
+
+class Beside(Silenced):
+    """With a topic that a node of its own derives."""
+
+    def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+        for topic, name, time_s, message in super().messages():
+            yield topic, name, time_s, message
+            if name == SCAN:
+                yield "/front/scan_filtered", name, time_s + 0.01, message
+
+
+SENT = (ODOMETRY, SCAN, BATTERY)
+
+
+def test_a_robot_that_is_heard_no_more_while_commands_go_on_is_one_event(tmp_path: Path) -> None:
+    findings = looked_at(Beside(silent=tuple((kind, 30.0, 99.0) for kind in SENT)), tmp_path).findings
+    (finding,) = findings
+    assert finding.title == "the link to the robot is lost: all that it sends ends"
+    assert finding.onset_s == pytest.approx(29.8, abs=1.0)
+    assert "/front/scan, /front/scan_filtered, /power, /wheels/odom end at" in finding.evidence
+    assert finding.consequences == ()
+
+
+def test_a_time_in_which_nothing_is_recorded_is_told(tmp_path: Path) -> None:
+    (finding,) = looked_at(Silenced(silent=tuple((kind, 20.0, 26.0) for kind in (*SENT, TWIST))), tmp_path).findings
+    assert finding.title == "nothing at all is recorded for 6.2 s"
+    assert finding.onset_s == pytest.approx(19.8, abs=0.1)
+
+
+def test_an_outage_names_all_that_pauses(tmp_path: Path) -> None:
+    silent = ((ODOMETRY, 20.0, 27.0), (SCAN, 20.5, 27.0), (BATTERY, 20.0, 27.0))
+    findings = looked_at(Beside(silent=silent), tmp_path).findings
+    (outage,) = [one for one in findings if one.title.startswith("outage")]
+    assert outage.evidence.startswith("/front/scan, /front/scan_filtered, /wheels/odom pause for 7 to 7 s")
+
+
+def test_what_one_node_sends_is_no_outage_of_the_link(tmp_path: Path) -> None:
+    silent = ((SCAN, 20.0, 27.0),)
+    titles = [one.title for one in looked_at(Beside(silent=silent), tmp_path).findings]
+    assert not [title for title in titles if title.startswith("outage")]
+
+
+@pytest.mark.parametrize(
+    ("topic", "kind"),
+    [
+        ("/goal_pose", "geometry_msgs/msg/PoseStamped"),
+        ("/plan", "nav_msgs/msg/Path"),
+        ("/rviz/marker/feedback", "visualization_msgs/msg/InteractiveMarkerFeedback"),
+        ("/beeps", "std_msgs/msg/Empty"),
+    ],
+)
+def test_that_a_topic_of_events_ends_is_no_finding(topic: str, kind: str, tmp_path: Path) -> None:
+    class WithEvents(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            yield from super().messages()
+            message = random_message(ROS2, kind, np.random.default_rng(1))
+            yield from ((topic, kind, 0.5 * number, message) for number in range(20))
+
+    health = looked_at(WithEvents(), tmp_path)
+    assert [one.title for one in health.findings] == []
+    assert not [one for one in health.timeline if one.kind == "topic" and topic in one.text]
+
+
+def test_topics_that_end_together_are_one_finding_and_lead_to_none(tmp_path: Path) -> None:
+    class Ending(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            yield from super().messages()
+            for number in range(60):
+                for topic, until_s in (("/a", 20.0), ("/b", 20.4), ("/c", 27.0)):
+                    if number / 2 < until_s:
+                        yield topic, "std_msgs/msg/Float64", number / 2, FLOAT
+
+    (finding,) = looked_at(Ending(), tmp_path).findings
+    assert (finding.title, finding.consequences) == ("/a, /b end early", ())
+    assert [one.title for one in finding.followed_by] == ["/c ends early"]
+
+
+FLOAT = ROS2.types["std_msgs/msg/Float64"](1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -37,6 +37,7 @@ from care_core.ecosystems.ros.messages import (
     TWIST,
     TWIST_STAMPED,
     holds,
+    tells_events,
     tilt_of,
     topics,
     type_of,
@@ -49,6 +50,7 @@ from care_core.ecosystems.ros.posed_goals import posed_goals, section_of
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
 from care_core.numbers import Floats, median, quantile
+from care_core.records import Record
 from care_core.run import Damage, Setting
 
 if TYPE_CHECKING:
@@ -62,6 +64,9 @@ SCAN_MESSAGES = 5
 """A laser sends steadily as long as it lives: so few tell that it did, also in a recording that is thinned."""
 SILENT_S, SILENT_PERIODS = 5.0, 10.0
 """A stream has ended when it is silent for so long and for so many of its periods."""
+LOST_S, LOST_COMMANDS, LOST_TOGETHER_S = 2.0, 5, 4.0
+"""All that a robot sends has ended where nothing came for so long while so many commands did; a link that breaks ends
+all of it within the time in which a transport notices."""
 DROVE_M = 1.0
 """So far no robot is pushed or drifts that is done with its goals."""
 PILOTED = re.compile(r"joy|teleop|key", re.IGNORECASE)
@@ -84,6 +89,15 @@ LOG_FIELDS = MESSAGES[ROSOUT[0]].reads
 
 T = TypeVar("T")
 Prepare = Callable[[str, Table], "T | None"]
+
+
+class Lost(Record):
+    """All topics that a robot sends, when they ended, and until when commands to it went on, and how many."""
+
+    topics: tuple[str, ...]
+    at_s: float
+    until_s: float
+    commands: int
 
 
 class Drive(RunModel):
@@ -218,6 +232,36 @@ class Drive(RunModel):
             return None
         others = (self.times[name][-1] for name in self.streams if name not in (topic, _SIMULATED_CLOCK))
         return (last_s, period_s) if any(self.duration_s - end < silent_s / 2 for end in others) else None
+
+    @cached_property
+    def regular(self) -> Mapping[str, float]:
+        """Of these streams those whose silence means something: not of events, nor of commands, which end when nobody
+        commands. The clock of a simulation goes on without its robot."""
+        events = {one.name for one in self.channels if tells_events(one) or type_of(one) in (TWIST, TWIST_STAMPED)}
+        return {name: period for name, period in self.streams.items() if name not in {*events, _SIMULATED_CLOCK}}
+
+    def have_several_sources(self, topics: Collection[str]) -> bool:
+        """Whether several nodes send them: by their names, else by several kinds of message."""
+        nodes = [self.log.publishers().get(topic, frozenset()) for topic in topics]
+        if all(nodes):
+            return len(frozenset().union(*nodes)) > 1
+        return len({type_of(one) for one in self.channels if one.name in topics}) > 1
+
+    @cached_property
+    def lost(self) -> Lost | None:
+        """When all that the robot sends ended while commands to it go on; None where it did not."""
+        often = {topic: period_s for topic, period_s in self.regular.items() if period_s <= LOST_S}
+        ends = {topic: float(self.times[topic][-1]) for topic in often}
+        sensed = [one.name for one in self.channels if one.name in ends and type_of(one) in (ODOMETRY, SCAN, IMU)]
+        if not sensed or len(ends) < 2 or len({type_of(one) for one in self.channels if one.name in ends}) < 2:
+            return None
+        first_s, last_s = min(ends.values()), max(ends.values())
+        sent = [self.times[topic] for topic, _ in self.of(TWIST, TWIST_STAMPED)]
+        later = np.sort(np.concatenate([np.empty(0), *(t[t > last_s] for t in sent)]))
+        silent_s = max(LOST_S, STEADY * max(often.values()))
+        if last_s - first_s > LOST_TOGETHER_S or len(later) < LOST_COMMANDS or later[-1] - last_s < silent_s:
+            return None
+        return Lost(tuple(sorted(ends)), first_s, float(later[-1]), len(later))
 
     # Motion
 

@@ -70,7 +70,7 @@ AT_TIMES = (
 )
 """Types that are sent only while there is something to say: commands while somebody commands, poses that were found."""
 
-_OF_EVENTS = (PATH, "std_msgs/Empty", "geometry_msgs/PointStamped")
+_OF_EVENTS = (PATH, "std_msgs/Empty")
 _OF_EVENTS_BEGIN = ("visualization_msgs/InteractiveMarker",)
 _EVENTS = re.compile(
     r"goal|clicked|initial_?pose|interactive|rviz|event|bumper|contact|collision|feedback$|teleop|keyboard",

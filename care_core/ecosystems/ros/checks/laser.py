@@ -55,6 +55,8 @@ def find(drive: Drive) -> Iterator[Finding]:
     for channel in drive.channels:
         if type_of(channel) in (SCAN, CLOUD):
             silent = drive.ends_early(channel.name)
+            if drive.lost is not None and channel.name in drive.lost.topics:
+                continue
             if silent is not None:
                 yield _dead(drive, channel.name, *silent)
             else:

@@ -44,7 +44,7 @@ GOAL_SERVERS[KIND] = GoalServer(needs, goals, recoveries)
 MISSION_KINDS[KIND] = PosedMissions(
     KIND,
     {
-        "topic": "topic of geometry_msgs/PoseStamped, or of nav_msgs/Path which ends at the goal; /goal_pose unless given",
+        "topic": "topic of geometry_msgs/PoseStamped, or of nav_msgs/Path that ends at goals; /goal_pose unless given",
         "poses": "topic of geometry_msgs/PoseWithCovarianceStamped on which a localisation says where the robot is",
     },
 )
