@@ -127,7 +127,7 @@ def write_db3(
     return next(path for path in sorted(folder.iterdir()) if path.name != "metadata.yaml")
 
 
-def write_bag(path: Path, rows: range = range(MESSAGES), *, chunk_bytes: int = 1024) -> None:
+def write_bag(path: Path, rows: range = range(MESSAGES), *, chunk_bytes: int = 1024, later_s: int = 0) -> None:
     writer = BagWriter(path)
     writer.chunk_threshold = chunk_bytes
     with writer:
@@ -135,7 +135,7 @@ def write_bag(path: Path, rows: range = range(MESSAGES), *, chunk_bytes: int = 1
         for topic, kind, time_ns, message in list(recording(ROS1))[2 * rows.start : 2 * rows.stop]:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=ROS1)
-            writer.write(connections[topic], time_ns, bytes(ROS1.serialize_ros1(message, kind)))
+            writer.write(connections[topic], time_ns + later_s * SECOND_NS, bytes(ROS1.serialize_ros1(message, kind)))
 
 
 def leaves(store: Any, name: str) -> Iterator[str]:

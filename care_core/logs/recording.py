@@ -20,6 +20,9 @@ ROS1_SUFFIXES = (".bag", ".bag.active")
 RENAMED = "named in metadata.yaml but not there"
 """The fact about a recording whose files were renamed since."""
 
+PART = "part"
+"""The fact about a file which part of a recording it is."""
+
 _PART = re.compile(r"^(?P<series>.+)_(?P<number>0|[1-9]\d*)\.bag(\.active)?$")
 _ROS2_PART = re.compile(r"(_\d+)?\.(db3|mcap)$")
 _DATE = re.compile(r"\d{4}(-\d\d){5}")
@@ -33,6 +36,8 @@ class Recording(Record):
     metadata: Metadata = field(default_factory=Metadata)
     missing: tuple[Flaw, ...] = ()
     notes: dict[str, str] = field(default_factory=dict)
+    beside: tuple[Path, ...] = ()
+    """The files before and after it that by their names are parts of the same recording."""
 
 
 def recording_at(path: Path) -> Recording:
@@ -51,8 +56,10 @@ def recording_at(path: Path) -> Recording:
         return Recording((path,))
     if len(siblings) == 1:
         return Recording((path,), metadata)
-    place = f"{siblings.index(path.name) + 1} of {len(siblings)}; name the folder to read all as one run"
-    return Recording((path,), metadata.of_one_file(), notes={"part": place})
+    at = siblings.index(path.name)
+    place = f"{at + 1} of {len(siblings)}; name the folder to read all as one run"
+    beside = tuple(path.with_name(name) for name in (*siblings[max(at - 1, 0) : at], *siblings[at + 1 : at + 2]))
+    return Recording((path,), metadata.of_one_file(), notes={PART: place}, beside=beside)
 
 
 def whole_recording(path: Path) -> Path:

@@ -14,7 +14,7 @@ from care_core.logs import formats
 from care_core.logs.compression import Unpacker
 from care_core.logs.file_windows import opened
 from care_core.logs.message_index import Places
-from care_core.logs.recording import recording_at
+from care_core.logs.recording import PART, recording_at
 from care_core.logs.ros1_records import MAGIC, BagChunk, BagContents, locate, read_contents
 from care_core.logs.ros_log import (
     BrokenRecordError,
@@ -41,8 +41,11 @@ class Ros1Bag(RosLog):
         recording = recording_at(path)
         parts = [Ros1Part(file) for file in recording.files]
         _check_one_run(path, parts)
+        notes = dict(recording.notes)
+        if recording.beside and not any(_joins(parts[0], file) for file in recording.beside):
+            del notes[PART]  # numbered by hand: recordings of their own
         super().__init__(
-            path, formats.ROS1_BAG, parts, missing=recording.missing, notes=recording.notes,
+            path, formats.ROS1_BAG, parts, missing=recording.missing, notes=notes,
         )  # fmt: skip
 
 
@@ -91,14 +94,29 @@ class Ros1Part:
                 yield number, time_ns, *piece_of(buffer, pos, after)
 
 
+def _joins(part: Ros1Part, file: Path) -> bool:
+    """Whether another file begins where a part ends, or ends where it begins; one that cannot be read may."""
+    try:
+        spans = sorted((_span(part), _span(Ros1Part(file))))
+    except (LogError, ValueError):
+        return True
+    return _follows(*spans)
+
+
+def _span(part: Ros1Part) -> tuple[int, int]:
+    """First and last record time, ns; ValueError where there is none."""
+    times = part.times_ns.values()
+    return min(int(t.min()) for t in times), max(int(t.max()) for t in times)
+
+
+def _follows(sooner: tuple[int, int], later: tuple[int, int]) -> bool:
+    return -_MOST_PAUSE_NS < later[0] - sooner[1] < _MOST_PAUSE_NS
+
+
 def _check_one_run(path: Path, parts: Sequence[Ros1Part]) -> None:
     """Refuse a folder whose parts do not follow one another. Raises LogError."""
-    spans = [
-        (min(int(times.min()) for times in part.times_ns.values()), max(int(t.max()) for t in part.times_ns.values()))
-        for part in parts
-        if part.times_ns
-    ]
-    if any(not -_MOST_PAUSE_NS < later[0] - sooner[1] < _MOST_PAUSE_NS for sooner, later in pairwise(spans)):
+    spans = [_span(part) for part in parts if part.times_ns]
+    if not all(_follows(sooner, later) for sooner, later in pairwise(spans)):
         raise LogError(
             "The bags in the folder are separate recordings.", hint="Name one log file in it.", where=str(path)
         )

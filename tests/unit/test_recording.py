@@ -177,3 +177,12 @@ def test_of_many_messages_every_third_is_decoded(tmp_path: Path, container: str)
         assert table.t.tolist() == whole[topic].t[::step].tolist()
         assert all(is_same(column[0], whole[topic][path][0]) for path, column in table.columns.items())
         assert all(is_same(column[-1], whole[topic][path][::step][-1]) for path, column in table.columns.items())
+
+
+def test_bags_that_are_numbered_by_hand_are_no_parts_of_a_run(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run_1.bag", range(20))
+    write_bag(tmp_path / "run_2.bag", range(20, 40))
+    assert open_log(tmp_path / "run_2.bag").facts["part"] == "2 of 2; name the folder to read all as one run"
+    (tmp_path / "run_2.bag").unlink()
+    write_bag(tmp_path / "run_2.bag", range(20, 40), later_s=300)
+    assert "part" not in open_log(tmp_path / "run_1.bag").facts
