@@ -128,6 +128,8 @@ def every_finding(findings: Iterable[Finding]) -> Iterator[Finding]:
 WHOLE_LOG = "the whole log"
 """Source of the finding that says no more than that the log holds too little."""
 TOO_SHORT = "too little is recorded to say anything of a run"
+NO_TASK = "neither goals nor messages of nodes are recorded: what the robot was to do is not known"
+"""Its title where checks of the robot did run, and only its task is not known."""
 NOT_FLOWN = "the vehicle never armed: no run of it is in this log"
 
 

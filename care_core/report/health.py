@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from care_core.diagnose.verdict import UNKNOWN_PARAMETER, Reason
-from care_core.ecosystems.findings import Event, Finding
+from care_core.ecosystems.findings import NO_TASK, Event, Finding
 from care_core.report.entries import EventEntry, FindingEntry
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.text import log_time, log_times, wrapped
@@ -54,7 +54,7 @@ def telling(account: Sequence[E], most: int) -> list[E]:
 def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
     """The findings as text, what belongs to another under it; that nothing was found is said plainly."""
     shown = noted(findings)
-    if findings and not shown:
+    if any(one.title != NO_TASK for one in findings) and not shown:
         return
     if not shown:
         yield "Findings: no health problems found in what this log records"

@@ -676,3 +676,14 @@ def test_topics_that_end_together_are_one_finding_and_lead_to_none(tmp_path: Pat
 
 
 FLOAT = ROS2.types["std_msgs/msg/Float64"](1.0)
+
+
+def test_a_position_that_moves_has_moved_though_no_speed_is_told(tmp_path: Path) -> None:
+    def without_speed(message: Any, time_s: float) -> None:
+        message.twist.twist.linear.x = message.twist.twist.angular.z = 0.0
+
+    texts = [one.text for one in looked_at(changed(ODOMETRY, without_speed), tmp_path).timeline]
+    assert "the robot moves for the first time" in texts
+    (told,) = [text for text in texts if text.startswith("its positions lie within")]
+    assert told.endswith("its odometry tells no speed")
+    assert "the robot never moved" not in texts

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from care_core.report.terminal import to_text
 from care_core.run import Check, Unavailable, Value, is_known
 from tests.nav2_drive import recorded
 from tests.rewritten import write_text
+from tests.ros_drives import STATUS, Drive
 from tests.ros_samples import write_bag
 from tests.tables import TablesLog, read
 from tests.unit.test_ardupilot_extract import HOME, KIND, METRES, flight, table
@@ -283,3 +284,14 @@ def test_a_failed_run_of_a_stranger_is_a_fault_without_causes_by_parameters(tmp_
     assert verdict_of(failed).exit_code == ExitCode.FAULT
     assert "FAULT: a failsafe acted" in to_text(failed)
     assert "**FAULT**: a failsafe acted" in to_markdown(build_document(failed))
+
+
+def test_of_a_drive_whose_task_is_not_recorded_it_is_said_that_checks_found_nothing(tmp_path: Path) -> None:
+    class Aimless(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            yield from (one for one in super().messages() if one[1] != STATUS)
+
+    path = Aimless().write(tmp_path / "drive.mcap")
+    text = to_text(open_case(Request(path), lambda _step, _share: None).diagnosis)
+    assert "NOT EVALUATED: neither goals nor messages of nodes are recorded" in " ".join(text.split())
+    assert "Findings: no health problems found in what this log records" in text

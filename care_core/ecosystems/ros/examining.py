@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from care_core.ecosystems.explains import EXPLAINS
-from care_core.ecosystems.findings import Finding, Health
+from care_core.ecosystems.findings import NO_TASK, Finding, Health
 from care_core.ecosystems.ranking import SLACK_S, rank_findings
 from care_core.ecosystems.ros.checks import CHECKS
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive
@@ -83,7 +83,7 @@ def _too_little(drive: Drive) -> str:
     if drive.duration_s < SHORT_S:
         return f"{drive.duration_s:.1f} s are too short to judge a robot by"
     if not speaks:
-        return "neither goals nor messages of nodes are recorded: what the robot was to do is not known"
+        return NO_TASK
     return ""
 
 

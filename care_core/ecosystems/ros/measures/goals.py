@@ -132,7 +132,8 @@ class GoalMissions(MissionKind):
             value = drive.untold
         elif goals and goals[-1].status is None:
             value = Unavailable("the log ends before the last goal was answered", "record until it is")
-        return (Check("goals_reached", value, "every goal that was not taken back was reached", word),)
+        check = Check("goals_reached", value, "every goal that was not taken back was reached", word)
+        return (goal_server(mission.spec).judged(goals, check),)
 
 
 def _split(goals: Sequence[Goal], spec: Args) -> list[list[Goal]]:
