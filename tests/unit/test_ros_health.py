@@ -505,6 +505,20 @@ def test_a_robot_that_tips_over_is_told_first_and_what_follows_from_it(outcome: 
     assert any(one.text == "1 contact told by /collision_event: 16.0 s" for one in health.timeline)
 
 
+def test_a_robot_that_falls_off_an_edge_is_told(tmp_path: Path) -> None:
+    def falls(message: Any, time_s: float) -> None:
+        message.pose.pose.position.z = -0.5 if time_s > FAILS_AT_S else 0.0
+        if 0.0 < time_s - FAILS_AT_S < 0.5:
+            message.pose.pose.orientation = LEANING
+
+    first = looked_at(changed(ODOMETRY, falls), tmp_path).findings[0]
+    assert (first.title, first.severity) == ("the robot falls or is thrown up", "critical")
+    assert first.onset_s == pytest.approx(FAILS_AT_S, abs=1.0)
+
+
+LEANING = ROS2.types["geometry_msgs/msg/Quaternion"](0.26, 0.0, 0.0, 0.9656)
+
+
 def test_odometry_does_not_drift_while_something_pushes_the_robot(tmp_path: Path) -> None:
     assert [one for one in looked_at(Hits("pushed"), tmp_path).findings if "drifts" in one.title] == []
 

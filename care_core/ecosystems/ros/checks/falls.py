@@ -22,6 +22,9 @@ LIMITS.add("time before", falls.LEVEL_S, "s", "a choice: it must have stood")
 LIMITS.add("share of that time that it stood level", falls.MOSTLY, "", "a choice: ramps and kerbs are short")
 LIMITS.add("height gained for each metre of way", falls.RISES, "", "what climbs more steeply flies")
 LIMITS.add("height that does not count", falls.RISES_M, "m", "drift of a height")
+LIMITS.add("leap of its height", falls.LEAP_M, "m", "no kerb that a robot climbs is as high")
+LIMITS.add("time of a leap", falls.LEAP_S, "s", "a fall of a metre takes half as long")
+LIMITS.add("change of its height before a leap", falls.PLANAR_M, "m", "a choice: what goes up and down is no floor")
 LEAPS_M = LIMITS.add("change of its height that is told", 0.1, "m", "a choice: more than a wheel that lifts")
 CONTACT_S = LIMITS.add("how long before a contact belongs to it", 3.0, "s", "a choice: a robot tips within a second")
 HELD_S = LIMITS.add("time that a robot is held", 5.0, "s", "as a standstill against commands")
@@ -39,7 +42,7 @@ def find(drive: Drive) -> Iterator[Finding]:
 
 def _fallen(drive: Drive, fall: Fall) -> Finding:
     words = [f"tilted by up to {fall.most_deg:.0f} deg from {log_time(fall.start_s)} on"]
-    words += ["and so to the end" if fall.stays else f"until {log_time(fall.end_s)}"]
+    words += ["and so to the end" if fall.stays else f"until {log_time(fall.end_s)}"] if fall.lies else []
     if fall.rose_m > LEAPS_M:
         words.append(f"its height changes by {fall.rose_m:.1f} m")
     near = drive.contacts_s[np.abs(drive.contacts_s - fall.start_s) <= CONTACT_S]
@@ -47,7 +50,7 @@ def _fallen(drive: Drive, fall: Fall) -> Finding:
         words.append(f"a contact is told at {log_time(float(near[0]))}")
     return Finding(
         kind="crash",
-        title="the robot tips over",
+        title="the robot tips over" if fall.lies else "the robot falls or is thrown up",
         onset_s=fall.start_s,
         end_s=drive.duration_s if fall.stays else fall.end_s,
         severity="critical",

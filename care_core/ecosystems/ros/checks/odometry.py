@@ -23,9 +23,10 @@ LIMITS = Limits()
 _HEALTHY = "301 healthy move_base missions"
 _DRIFT = f"{_HEALTHY}: 97.5 % stay below"
 _WAY = "a drift shows over more than the noise of a step, or sooner where it is strong"
-BEYOND = LIMITS.add("speed against the most that positions give", 5.0, "", "a choice: no filter, no slip makes it")
-JUMPS_MPS = LIMITS.add("speed beyond that", 2.0, "m/s", "a choice: spikes of a coarse encoder are less")
-JUMPS_RADPS = LIMITS.add("turn beyond that", 6.0, "rad/s", "a choice: spikes of a coarse encoder are less")
+_SPIKES = "drivers that repeat a pose make up to 8 times the speed, 3 m/s, of the step that follows"
+BEYOND = LIMITS.add("speed against the most that positions give", 10.0, "", _SPIKES)
+JUMPS_MPS = LIMITS.add("speed beyond that", 3.0, "m/s", _SPIKES)
+JUMPS_RADPS = LIMITS.add("turn beyond that", 8.0, "rad/s", "a choice: of a robot that turns by 1 rad/s")
 BUNCHED = LIMITS.add("step of stamps in a bunch, of the usual one", 0.05, "", "what is divided by it grows as much")
 JUMP_M = LIMITS.add("step beyond what speed and time allow", 0.3, "m", f"{_HEALTHY}: at most 0.07 m")
 JUMP_AT_REST_M = LIMITS.add("the same of a robot that stands", 0.15, "m", f"{_HEALTHY}: at most 0.07 m of any")
@@ -52,6 +53,7 @@ BACK = LIMITS.add("how near it is to where it was, in steps", 0.3, "", "while th
 PLACES = LIMITS.add("transforms of map -> odom", 3, "", "fewer show no step")
 FOUND_S = LIMITS.add("time to find the robot on the map", 5.0, "s", "the first corrections are large")
 PUSHED_S = LIMITS.add("time after a contact that is not compared", 10.0, "s", "a choice: it pushes, or backs off")
+HELD_S = LIMITS.add("time that it stands against commands", 1.0, "s", "odometry that repeats itself stands for less")
 BEFORE_S = LIMITS.add("time before it that is not either", 1.0, "s", "a choice: who tells of it is late")
 PAUSE_S = LIMITS.add("pause between samples", STALE_S, "s", "over a longer one the speed is not known")
 
@@ -206,7 +208,8 @@ def _pushed(drive: Drive) -> list[tuple[float, float]]:
     """When something else than its wheels moved or held the robot: contacts, a fall, standing against commands."""
     spans = [(at - BEFORE_S, at + PUSHED_S) for at in drive.contacts_s.tolist()]
     spans += [] if drive.fall is None else [(drive.fall.start_s - BEFORE_S, np.inf)]
-    return spans + [(start - BEFORE_S, end + BEFORE_S) for start, end in standstills(drive)]
+    held = [(start, end) for start, end in standstills(drive) if end - start >= HELD_S]
+    return spans + [(start - BEFORE_S, end + BEFORE_S) for start, end in held]
 
 
 def _drifting(
