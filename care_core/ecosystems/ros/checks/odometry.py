@@ -127,7 +127,7 @@ def _impossible(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
     if not len(rows):
         return
     words = [
-        f"up to {speeds[where].max():.3g} {unit}, its positions give {known:.1f} {unit} at most"
+        f"up to {speeds[where].max():.1f} {unit}, its positions give {known:.1f} {unit} at most"
         for (speeds, _, unit), known, where in zip(told, most, bad, strict=True)
         if where.any()
     ]
