@@ -150,3 +150,21 @@ def test_levels_of_every_ros_are_one_scale() -> None:
         "info", "debug", "info", "WARN", "ERROR", "FATAL",
     ]  # fmt: skip
     assert level_word(7) == "7"
+
+
+@pytest.mark.parametrize(
+    ("nodes", "topics", "told"),
+    [
+        ({"/front/scan": "/a", "/wheels/odom": "/a"}, ("/front/scan", "/wheels/odom"), False),
+        ({"/front/scan": "/a", "/wheels/odom": "/b"}, ("/front/scan", "/wheels/odom"), True),
+        ({}, ("/front/scan", "/wheels/odom"), True),
+        ({}, ("/front/scan",), False),
+    ],
+)
+def test_topics_come_from_several_nodes_by_name_or_by_kind(
+    nodes: Mapping[str, str], topics: Sequence[str], told: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = open_log(Driven().write(tmp_path / "drive.mcap"))
+    assert isinstance(log, RosLog)
+    monkeypatch.setattr(log, "publishers", lambda: {topic: frozenset({node}) for topic, node in nodes.items()})
+    assert Drive(log).have_several_sources(topics) is told

@@ -293,3 +293,18 @@ def test_bags_from_elsewhere(recorded: Path) -> None:
     ]
     np.testing.assert_array_equal(poses[0]["x"], poses[1]["x"])
     assert np.all(np.diff(Ros1Bag(bags / "unsorted_chunks.bag").read({"foo": ("data",)})["foo"].t) >= 0)
+
+
+def test_a_bag_says_which_nodes_send_a_topic(tmp_path: Path) -> None:
+    writer = Writer(tmp_path / "two.bag")
+    with writer:
+        for topic, node in (("/a", "/left"), ("/a", "/right"), ("/b", "/right"), ("/c", None)):
+            connection = writer.add_connection(topic, TEXT, typestore=STORE, callerid=node)
+            writer.write(connection, START_NS, bytes(STORE.serialize_ros1(make(TEXT, "hello"), TEXT)))
+    log = open_log(tmp_path / "two.bag")
+    assert isinstance(log, Ros1Bag)
+    both, one = frozenset({"/left", "/right"}), frozenset({"/right"})
+    assert log.publishers() == {"/a": both, "/b": one, "/c": frozenset()}
+
+
+TEXT = "std_msgs/msg/String"

@@ -37,6 +37,7 @@ from care_core.ecosystems.ros.messages import (
     TWIST,
     TWIST_STAMPED,
     holds,
+    plainness,
     tells_events,
     tilt_of,
     topics,
@@ -271,7 +272,7 @@ class Drive(RunModel):
         read = (odometry_of(topic, table) for topic, table in self.of(ODOMETRY))
         told = (one.where(~inside(self._dead(one.topic), one.recorded_s)) for one in read if one is not None)
         found = [steady for one in told if (steady := one.advancing()) is not None]
-        return min(found, key=lambda one: (not one.tells_speed, *_plainness(one.topic, "odom")), default=None)
+        return min(found, key=lambda one: (not one.tells_speed, *plainness(one.topic, "odom")), default=None)
 
     @cached_property
     def commands(self) -> Commands | None:
@@ -279,7 +280,7 @@ class Drive(RunModel):
         found = (commands_of(topic, table) for topic, table in self.of(TWIST, TWIST_STAMPED))
         known = [one for one in found if one is not None]
         named = [one for one in known if one.topic.rpartition("/")[2] == "cmd_vel"] or known
-        ranked = sorted((_plainness(one.topic, "cmd_vel"), number) for number, one in enumerate(named))
+        ranked = sorted((plainness(one.topic, "cmd_vel"), number) for number, one in enumerate(named))
         is_told = len(ranked) == 1 or (len(ranked) > 1 and ranked[0][0][:2] != ranked[1][0][:2])
         return named[ranked[0][1]] if is_told else None
 
@@ -478,8 +479,3 @@ def _spoken(topic: str, table: Table) -> tuple[LogMessage, ...] | None:
 def _namespace(topic: str) -> str:
     """Of several robots each has its own."""
     return topic.rpartition("/")[0]
-
-
-def _plainness(topic: str, name: str) -> tuple[bool, int, str]:
-    """Ranks topics: `/odom` before `/robot/odom` before `/odometry/filtered`."""
-    return topic.rpartition("/")[2] != name, topic.count("/"), topic

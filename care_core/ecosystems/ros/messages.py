@@ -200,6 +200,11 @@ def type_of(channel: Channel) -> str:
     return next((ending for ending in (ACTION_GOAL, ACTION_RESULT) if name.endswith(ending)), name)
 
 
+def plainness(topic: str, name: str) -> tuple[bool, int, str]:
+    """Ranks topics: `/odom` before `/robot/odom` before `/odometry/filtered`."""
+    return topic.rpartition("/")[2] != name, topic.count("/"), topic
+
+
 def speaks_at_times(type: str) -> bool:
     """Whether a type's silence is no hole."""
     return type in AT_TIMES or type in WITHOUT_STREAM

@@ -24,6 +24,7 @@ from care_core.ecosystems.ros.messages import (
     TF,
     TWIST,
     TWIST_STAMPED,
+    plainness,
     type_of,
     yaw_of,
 )
@@ -99,7 +100,7 @@ def _named(channels: Iterable[Channel], type: str, endings: Sequence[str]) -> st
 
 def _plainest(channels: Iterable[Channel], types: Sequence[str], name: str) -> str | None:
     found = (one.name for one in channels if type_of(one) in types)
-    return min(found, key=lambda own: (own.rpartition("/")[2] != name, own.count("/"), own), default=None)
+    return min(found, key=lambda topic: plainness(topic, name), default=None)
 
 
 def needs(spec: Mapping[str, Any]) -> Wanted:
