@@ -641,6 +641,15 @@ def test_a_time_in_which_nothing_is_recorded_is_told(tmp_path: Path) -> None:
     assert finding.onset_s == pytest.approx(19.8, abs=0.1)
 
 
+def test_a_clock_that_was_set_forward_is_no_silence(tmp_path: Path) -> None:
+    class Set(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                yield topic, name, time_s + (100.0 if time_s > 20.0 else 0.0), message
+
+    assert [one.title for one in looked_at(Set(), tmp_path).findings if one.kind == "radio"] == []
+
+
 def test_an_outage_names_all_that_pauses(tmp_path: Path) -> None:
     silent = ((ODOMETRY, 20.0, 27.0), (SCAN, 20.5, 27.0), (BATTERY, 20.0, 27.0))
     findings = looked_at(Beside(silent=silent), tmp_path).findings

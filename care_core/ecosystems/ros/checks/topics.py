@@ -10,6 +10,7 @@ import numpy as np
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.coverage import Span
 from care_core.ecosystems.findings import Finding, FindingKind
+from care_core.ecosystems.plausible import STAMP, set_forward
 from care_core.ecosystems.ros.drive import SILENT_PERIODS, SILENT_S, STREAM_MESSAGES, Drive
 from care_core.ecosystems.ros.messages import (
     BATTERY,
@@ -21,6 +22,7 @@ from care_core.ecosystems.ros.messages import (
     ODOMETRY,
     ROSOUT,
     SCAN,
+    STAMPED,
     STATUS,
     reading,
     tells_events,
@@ -113,7 +115,7 @@ def _lost(drive: Drive) -> Iterator[Finding]:
 
 def _silence(drive: Drive) -> list[Span]:
     """When nothing at all was recorded, though what is sent by itself comes often before and after."""
-    every = np.sort(np.concatenate([np.empty(0), *drive.times.values()]))
+    every = np.sort(np.concatenate([np.empty(0), *drive.log.times().values()]))  # those of other robots, too
     sent = [drive.times[one.name] for one in drive.channels if not tells_events(one) and type_of(one) not in COMMANDS]
     by_itself = np.sort(np.concatenate([np.empty(0), *sent]))
     steps = np.diff(by_itself)
@@ -122,7 +124,19 @@ def _silence(drive: Drive) -> list[Span]:
     rows = np.flatnonzero(np.diff(every) > max(SILENCE_S, OUTAGE_PERIODS * usual))
     spans = [(float(every[row]), float(every[row + 1])) for row in rows]
     begun_s = by_itself[STREAM_MESSAGES]  # what is kept for a recorder comes at once, the rest when it is started
-    return [(start, end) for start, end in spans if begun_s <= start and by_itself[-1] >= end]
+    set_s = _clock_set_s(drive)
+    return [
+        (start, end)
+        for start, end in spans
+        if begun_s <= start and by_itself[-1] >= end and not any(start <= at <= end for at in set_s)
+    ]
+
+
+def _clock_set_s(drive: Drive) -> list[float]:
+    """When the recorder's clock was set forward, as the robot's own tells: that is no silence."""
+    stamped = (table for _, table in drive.of(*STAMPED) if STAMP in table.columns)
+    found = (set_forward(table.t, np.asarray(table[STAMP], np.float64)) for table in stamped)
+    return [one[0] for one in found if one is not None]
 
 
 def _silent(drive: Drive, spans: list[Span]) -> Iterator[Finding]:
@@ -153,12 +167,13 @@ def _gone(drive: Drive, start: float) -> list[str]:
 
 def _pauses(drive: Drive) -> list[tuple[float, float, str]]:
     """Every long pause of what comes regularly: from, to, topic."""
-    found = []
+    found, set_s = [], _clock_set_s(drive)
     for topic, period_s in drive.regular.items():
         times = drive.times[topic]
         long = max(OUTAGE_S, OUTAGE_PERIODS * period_s) if period_s <= SELDOM_S else np.inf
         for row in np.flatnonzero(np.diff(times) >= long):
-            found.append((float(times[row]), float(times[row + 1]), topic))
+            if not any(times[row] <= at <= times[row + 1] for at in set_s):
+                found.append((float(times[row]), float(times[row + 1]), topic))
     return sorted(found)
 
 
@@ -274,7 +289,7 @@ def _renamed(drive: Drive) -> Iterator[Finding]:
 CHECK = Check(
     "topics",
     "incompatible QoS, outages, streams that end early",
-    reading(*ROSOUT, ODOMETRY, *COMMANDS, *GOALS),
+    reading(*ROSOUT, *STAMPED, *COMMANDS, *GOALS),
     LIMITS,
     find,
 )
