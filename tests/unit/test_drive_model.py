@@ -23,6 +23,7 @@ from care_core.logs.ros_log import RosLog
 from care_core.records import replace
 from tests.ros_drives import ABORTED, SUCCEEDED
 from tests.ros_drives import Drive as Driven
+from tests.ros_samples import ROS2, START_NS, McapFile, cdr
 
 TOPIC = "/front/scan"
 FAULTS = ("laser dead", "laser stuck", "laser noise", "jump", "drift", "weak", "pulls", "stall", "loss", "battery",
@@ -168,3 +169,24 @@ def test_topics_come_from_several_nodes_by_name_or_by_kind(
     assert isinstance(log, RosLog)
     monkeypatch.setattr(log, "publishers", lambda: {topic: frozenset({node}) for topic, node in nodes.items()})
     assert Drive(log).have_several_sources(topics) is told
+
+
+@pytest.mark.parametrize(
+    ("topic", "times", "told"),
+    [
+        ("/collision_event", [5.0, 5.2, 9.0], [5.0, 9.0]),
+        ("/bumper", [0.1, 7.0], [7.0]),
+        ("/collision_monitor_state", [5.0], []),
+        ("/bumper", [0.1 * number for number in range(100)], []),
+    ],
+)
+def test_contacts_are_told_by_topics_that_speak_only_then(
+    topic: str, times: Sequence[float], told: Sequence[float], tmp_path: Path
+) -> None:
+    empty = ROS2.types["std_msgs/msg/Empty"]()
+    with McapFile(tmp_path / "contacts.mcap") as log:
+        for time_s in (0.0, *times):
+            log.add("/begin" if time_s == 0 else topic, empty.__msgtype__, START_NS + round(time_s * 1e9), cdr(empty))
+    model = run_model(open_log(tmp_path / "contacts.mcap"))
+    assert isinstance(model, Drive)
+    assert model.contacts_s.tolist() == pytest.approx(list(told))

@@ -74,6 +74,11 @@ PILOTED = re.compile(r"joy|teleop|key", re.IGNORECASE)
 """In the name of a topic on which a person drives."""
 CONTACT = re.compile(r"contact|collision|bumper", re.IGNORECASE)
 """In the name of a topic on which something speaks only while it touches the robot, or at times."""
+_NO_CONTACT = re.compile(
+    r"monitor|detector|display|object|constraint|marker|distance|check|mesh|model|map|scan|enable|param|avoid",
+    re.IGNORECASE,
+)
+"""In the names of those that tell of what could touch it (Nav2's collision monitor, MoveIt's scene)."""
 MOST_CONTACTS = 50
 """A topic that says more tells of what does not touch, too."""
 LATCHED_S, SAME_CONTACT_S = 1.0, 0.5
@@ -243,7 +248,8 @@ class Drive(RunModel):
 
     def have_several_sources(self, topics: Collection[str]) -> bool:
         """Whether several nodes send them: by their names, else by several kinds of message."""
-        nodes = [self.log.publishers().get(topic, frozenset()) for topic in topics]
+        named = self.log.publishers()
+        nodes = [named.get(topic, frozenset()) for topic in topics]
         if all(nodes):
             return len(frozenset().union(*nodes)) > 1
         return len({type_of(one) for one in self.channels if one.name in topics}) > 1
@@ -341,7 +347,10 @@ class Drive(RunModel):
         return tuple(
             one.name
             for one in self.channels
-            if CONTACT.search(one.name) and 0 < one.count <= MOST_CONTACTS and one.name not in self.streams
+            if CONTACT.search(one.name)
+            and not _NO_CONTACT.search(one.name)
+            and 0 < one.count <= MOST_CONTACTS
+            and one.name not in self.streams
         )
 
     @cached_property
