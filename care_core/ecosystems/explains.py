@@ -44,7 +44,7 @@ EXPLAINS: Explains = {
     "drive": frozenset(("drive", "planner", "control")),
     "commands": frozenset(("drive", "planner", "control")),
     "tf": frozenset(("tf", "planner", "control")),
-    "topics": frozenset(("localisation", "tf", "planner", "control")),  # no topic ends another: a node ends several
+    "topics": frozenset(("tf", "planner", "control")),  # no topic ends another: a node ends several
     "planner": frozenset(("planner", "control", "tf")),  # one that finds no path keeps the computer busy
     "control": frozenset(("control",)),
     "software": frozenset(("software", "topics")),
