@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.goals import Goal, Status
-from care_core.ecosystems.ros.measures.nav2 import FEEDBACK_FIELDS, PLAN_FIELDS, POSE_FIELDS, goals
+from care_core.ecosystems.ros.measures.nav2 import FEEDBACK_FIELDS, goals
 from care_core.ecosystems.ros.messages import FRAME, MESSAGES, TREE, TWIST_STAMPED
 from care_core.ecosystems.ros.messages import STATUS as STATES
+from care_core.ecosystems.ros.posed_goals import PLAN_FIELDS, POSE_FIELDS
 from care_core.logs.base import Table
 from care_core.logs.formats import ROS2_DB3
 from care_core.run import Unavailable, Value
