@@ -75,7 +75,7 @@ def twice(tmp_path_factory: pytest.TempPathFactory) -> tuple[Diagnosis, Diagnosi
 
 
 def test_a_copy_is_no_repeat(twice: tuple[Diagnosis, Diagnosis, Path]) -> None:
-    with pytest.raises(UsageError, match="same log is no repeat"):
+    with pytest.raises(UsageError, match="same recording is no repeat"):
         care_core.triage(Request(COPTER, repeats=(twice[2],)))
 
 

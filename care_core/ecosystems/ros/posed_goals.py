@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -28,13 +28,14 @@ from care_core.ecosystems.ros.messages import (
     type_of,
     yaw_of,
 )
-from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS, Odometry, Poses, moved_to
+from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS, Commands, Odometry, Poses, moved_to
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.numbers import Bools, Floats
 from care_core.records import Record, replace
+from care_core.run import Setting
 
 if TYPE_CHECKING:
-    from care_core.ecosystems.ros.drive import Drive
+    from care_core.logs.ros_log import RosLog
 
 KIND = "posed_goals"
 _NAMES = ("goal_pose", "move_base_simple/goal", "current_goal", "goal")
@@ -77,6 +78,22 @@ _MOST_GOALS, _LASTS_S = 50, 3.0
 """More goals than these, or such as last no longer, are a target that moves."""
 
 
+class Driven(Protocol):
+    """What is asked of the model of a recording."""
+
+    @property
+    def log(self) -> RosLog: ...
+    @property
+    def duration_s(self) -> float: ...
+    @property
+    def channels(self) -> Sequence[Channel]: ...
+    @property
+    def parameters(self) -> Mapping[str, Setting]: ...
+    def tables(self, wanted: Wanted) -> Mapping[str, Table]: ...
+    def odometry_on(self, topic: str) -> Odometry | None: ...
+    def commands_on(self, topic: str) -> Commands | None: ...
+
+
 def section_of(channels: Sequence[Channel]) -> Mapping[str, Any] | None:
     """Where a recording without action topics tells its goals, as a mission section; None where it tells none."""
     there = [one for one in channels if one.count]
@@ -110,7 +127,7 @@ def needs(spec: Mapping[str, Any]) -> Wanted:
     return {topic: (*POSE_FIELDS, *PLAN_FIELDS[1:]), **places}
 
 
-def posed_goals(drive: Drive, spec: Mapping[str, Any]) -> tuple[Goal, ...]:
+def posed_goals(drive: Driven, spec: Mapping[str, Any]) -> tuple[Goal, ...]:
     """Every goal of a topic, in the order sent, with how it ended as far as the robot's place tells.
 
     Why it does not tell stands in the text of a goal.
@@ -172,7 +189,7 @@ class _Track(Record, eq=False):
     odometry: Odometry
 
 
-def _track(drive: Drive, spec: Mapping[str, Any], frame: str) -> _Track | str:
+def _track(drive: Driven, spec: Mapping[str, Any], frame: str) -> _Track | str:
     """Where the robot was; in words why nobody knows."""
     whole = drive.odometry_on(str(spec["odometry"])) if "odometry" in spec else None
     odometry = None if whole is None else whole.advancing()
@@ -199,7 +216,7 @@ def _rests(odometry: Odometry) -> Bools:
     return np.asarray(went < _RESTS_M)
 
 
-def _localised(drive: Drive, spec: Mapping[str, Any], frame: str) -> Poses | None:
+def _localised(drive: Driven, spec: Mapping[str, Any], frame: str) -> Poses | None:
     """Where a localisation found the robot, in the frame of the goals."""
     if "poses" not in spec:
         return None
@@ -213,7 +230,7 @@ def _localised(drive: Drive, spec: Mapping[str, Any], frame: str) -> Poses | Non
     return Poses(table.t[known], x[known], y[known], yaw[known], frame) if frames == {frame or "map"} else None
 
 
-def _corrected(drive: Drive, odometry: Odometry, frame: str) -> Poses | None:
+def _corrected(drive: Driven, odometry: Odometry, frame: str) -> Poses | None:
     """The same by the transforms between the frames of goals and odometry."""
     topic = next((one.name for one in drive.channels if type_of(one) in TF and one.count), None)
     if topic is None:
@@ -239,7 +256,7 @@ def _corrected(drive: Drive, odometry: Odometry, frame: str) -> Poses | None:
     return Poses(odometry.t, placed_x, placed_y, odometry.yaw + yaw[at], frame)
 
 
-def _ended(drive: Drive, spec: Mapping[str, Any], goal: Goal, track: _Track, end_s: float, *, is_last: bool) -> Goal:
+def _ended(drive: Driven, spec: Mapping[str, Any], goal: Goal, track: _Track, end_s: float, *, is_last: bool) -> Goal:
     """The goal with how it ended: the robot stood there, another was sent, or it was on its way no more."""
     inside = (track.t >= goal.sent_s) & (track.t <= end_s)
     t, off = track.t[inside], np.hypot(track.x - goal.x, track.y - goal.y)[inside]
@@ -256,13 +273,13 @@ def _ended(drive: Drive, spec: Mapping[str, Any], goal: Goal, track: _Track, end
     return replace(goal, end_s=end_s, status=Status.NOT_REACHED, text=f"{off[-1]:.1f} m from it at the end, {why}")
 
 
-def _tolerance_m(drive: Drive) -> float:
+def _tolerance_m(drive: Driven) -> float:
     """What the goal checker allows, as far as the recording says."""
     values = [one.value for name, one in drive.parameters.items() if name.endswith("xy_goal_tolerance")]
     return max((float(value) for value in values if isinstance(value, (int, float))), default=0.0)
 
 
-def _given_up(drive: Drive, spec: Mapping[str, Any], goal: Goal, track: _Track) -> str:
+def _given_up(drive: Driven, spec: Mapping[str, Any], goal: Goal, track: _Track) -> str:
     """Why the robot was on its way no more when the recording ended; empty where it may have been."""
     odometry, last_s = track.odometry, float(track.t[-1])
     fall = fall_of(odometry.topic, odometry.t, odometry.tilt, odometry.z, odometry.path_m)
