@@ -137,9 +137,9 @@ def _(report: Report) -> bool:
     return report.verdict.status == "fault" and len(wrapped(report.verdict.headline)) > 2
 
 
-@_named("a fit longer than one line")
+@_named("a fit longer than two lines")
 def _(report: Report) -> bool:
-    return len(wrapped(report.verdict.fit)) > 1
+    return len(wrapped(report.verdict.fit)) > 2
 
 
 @_named("an OK that keeps a failed part to itself")
