@@ -18,7 +18,7 @@ from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
 from care_core.records import Record, replace
 from care_core.run import FIT_WORDS, Fit, FitVerdict
-from care_core.text import clean, log_time, percent
+from care_core.text import clean, listed, log_time, percent
 
 RunStatus = Status | Literal["unreadable"]
 """What became of a log: the status of its run, or that it could not be read."""
@@ -324,8 +324,11 @@ def _failed(
         names = ", ".join(one.name for one in unknown)
         # The reason first: of a long list of names a narrow line shows the beginning alone.
         return f"{reason}{'; ' if reason else ''}{names} could not be evaluated, no fault was found"
+    if status == "not_evaluated" and fit == "no":
+        met = listed([one.name for one in objectives if one.status == "ok"])
+        return f"nothing that could be judged failed ({met})"
     if status == "not_evaluated":
-        return "nothing that could be judged failed" if fit == "no" else "nothing could be judged"
+        return "nothing could be judged"
     part = next(filter(_is_broken_part, findings), None)
     return "all objectives are within their thresholds" if part is None else f"{BUT}{_with_time(part)}"
 
