@@ -20,7 +20,8 @@ def last_good(robot: Robot | None, run: Run) -> Mapping[str, Setting] | None:
     from care_core.run import Setting
 
     def is_ok(past: Triaged) -> bool:
-        return remembered_verdict(remembered(past.document)).status == "ok"
+        # What was judged by limits of its own, or against another run, may be good by those alone.
+        return not past.judged_with and remembered_verdict(remembered(past.document)).status == "ok"
 
     path = history_path()
     if path is None or not path.exists() or robot is None or not robot.is_sure or robot.is_simulated:

@@ -65,6 +65,8 @@ def test_the_last_run_before_the_log_in_which_nothing_failed_counts(history: His
     remember(history, 5, day=9, settings={"WP_JERK": 70.0})  # after it
     remember(history, 6, robot=replace(ROVER, id="R8"), settings={"WP_JERK": 80.0})
     remember(history, 7)  # its log held no parameters
+    by_own_limit = replace(UNTOLD, judged_with="--threshold mission_time=900")
+    remember(history, 8, settings={"WP_JERK": 90.0}, about=by_own_limit)
     found = last_good(ROVER, RUN)
     assert found is not None
     assert found["WP_JERK"].value == 1.0
