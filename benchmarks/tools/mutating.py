@@ -647,7 +647,7 @@ def main() -> None:
         before: dict[Path, Answer] = {}
         for number in range(given.count):
             rng = np.random.default_rng((given.seed, number))
-            kind = pick(rng, sorted(WAYS.keys() & sources.keys()))
+            kind = pick(rng, sorted(WAYS.keys() & sources.keys(), key=lambda one: one.name))
             source = pick(rng, sources[kind])
             path, what = broken(source, WAYS[kind], rng, folder)
             words = pick(rng, COMMANDS)

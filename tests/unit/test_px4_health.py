@@ -11,6 +11,7 @@ import pytest
 
 from care_core.ecosystems.dictionary import find_field
 from care_core.ecosystems.findings import Health
+from care_core.ecosystems.px4.attitude import lean_of
 from care_core.ecosystems.px4.examining import examine, reads
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.px4.messages import MESSAGES
@@ -368,3 +369,11 @@ def test_a_rover_that_is_driven_and_stands_is_told_with_what_its_driver_says() -
     drives = {**topics["vehicle_local_position"].columns, "vx": still + 0.3}
     moving = examine(Px4Flight(MadeLog({**topics, "vehicle_local_position": Table(t, drives)})))
     assert [one.kind for one in moving.findings] == ["software"]
+
+
+def test_what_is_no_rotation_is_no_attitude() -> None:
+    q = {"q[0]": np.array([1.0, np.inf, 1e300, 0.0]), **{f"q[{n}]": np.zeros(4) for n in (1, 2, 3)}}
+    lean = lean_of(Table(np.arange(4.0), q), None)
+    assert lean is not None
+    assert lean.tilt_deg[0] == 0.0
+    assert np.isnan(lean.tilt_deg[1:]).all()

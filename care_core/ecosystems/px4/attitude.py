@@ -20,6 +20,8 @@ READS: Wanted = {ATTITUDE: _Q, WANTED: _Q_D}
 
 _KNOWN_S = 1.0
 """A target that was not published for so long is none: nobody asks for an attitude."""
+_OFF_UNIT = 0.1
+"""Quaternions are of length 1; records round them."""
 
 
 class Lean(NamedTuple):
@@ -50,6 +52,9 @@ def lean_of(attitude: Table | None, wanted: Table | None) -> Lean | None:
 
 
 def _down(table: Table, names: tuple[str, ...]) -> Floats:
-    """The direction of down in the frame of the body, shape (3, n)."""
-    w, x, y, z = (table[name] for name in names)
+    """The direction of down in the frame of the body, shape (3, n); not a number where damage left no rotation."""
+    told = np.array([table[name] for name in names])
+    with np.errstate(over="ignore", invalid="ignore"):
+        is_rotation = np.abs(np.sum(told**2, axis=0) - 1.0) < _OFF_UNIT
+    w, x, y, z = np.where(is_rotation, told, np.nan)
     return np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x**2 + y**2)))
