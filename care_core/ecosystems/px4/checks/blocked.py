@@ -33,7 +33,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     outputs = [column for name, column in motors.columns.items() if name in READS[_MOTORS]]
     driven = np.max(np.abs(np.nan_to_num(outputs)), axis=0)
     speed = np.hypot(moved["vx"], moved["vy"])
-    turn = np.abs(np.degrees(np.gradient(np.unwrap(np.nan_to_num(moved["heading"])), moved.t)))
+    with np.errstate(divide="ignore", invalid="ignore"):  # damage gives records one time
+        turn = np.abs(np.degrees(np.gradient(np.unwrap(np.nan_to_num(moved["heading"])), moved.t)))
     stands = (speed < _STANDS_MS) & (turn < _TURNS_DPS) & (np.interp(moved.t, motors.t, driven) > _DRIVEN)
     for start, end in flight.spans(moved.t, stands):
         drives = flight.last(STATUS, "vehicle_type", start) == ROVER

@@ -33,6 +33,8 @@ _FAR_DEG = LIMITS.add("bank that loses a mission", 20.0, "deg", "2 of 2 simulate
 _OFF_US = LIMITS.add("trim off its default", 60.0, "us", "what banks it by 5 degrees")
 _SURE = LIMITS.add("probability of the trim", 0.9, "", "it is measured")
 _LOST = LIMITS.add("probability that a smaller bank loses the mission", 0.3, "", "a choice: its way is off in turns")
+_NO_RATE_DPS = 1000.0
+"""Where two records have one time: no straight flight."""
 _RUDDER, _MIDDLE_US = 21, 1500.0
 """Function of the output (SRV_Channel.h), and what its trim is as shipped."""
 
@@ -77,7 +79,9 @@ def _straight(flight: Flight, leans: Table) -> Mask:
     if moved is None or len(leans) < _RECORDS:
         return np.zeros(len(leans), dtype=bool)
     t = leans.t
-    turn = smooth(t, np.degrees(np.gradient(np.unwrap(np.radians(leans["Yaw"])), t)), _OVER_S)
+    with np.errstate(divide="ignore", invalid="ignore"):  # damage gives records one time
+        rate = np.degrees(np.gradient(np.unwrap(np.radians(leans["Yaw"])), t))
+    turn = smooth(t, np.where(np.isfinite(rate), rate, _NO_RATE_DPS), _OVER_S)
     flies = (np.interp(t, moved.t, moved["Spd"]) > _FLIES_MS) & during(flight.flown, t)
     return np.asarray(flies & (np.abs(turn) < _STRAIGHT_DPS))
 
