@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
-from care_core.diagnose.records import Cause, Diagnosis, Fault, PathNode, Prediction
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
 from care_core.report.health import account_lines, finding_lines, reason_lines
 from care_core.report.shared_causes import together
+from care_core.run import Value, is_known
 from care_core.text import listed, log_time, log_times, wrapped
 from care_core.variables import Variable
 
@@ -166,7 +167,7 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
             yield from wrapped(note, "    ! ")
     for objective in (result.variable for result in diagnosis.objectives):
         if objective.name in fix.predicted:
-            yield from wrapped(_prediction(objective, fix.predicted[objective.name], fix.is_guess), "  ", "    ")
+            yield from wrapped(_prediction(objective, fix, diagnosis.run.objectives), "  ", "    ")
     for other in diagnosis.alternatives:
         likely = promise(other.odds, as_driven, other.is_guess)
         yield from wrapped(f"or {', '.join(map(str, other.changes))}: {likely}", "  ", "     ")
@@ -180,14 +181,16 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     )
 
 
-def _prediction(objective: Variable, predicted: Prediction, is_guess: bool) -> str:
-    """A yes-or-no objective has a probability, not a value."""
-    likely = None if predicted.p_ok is None else chance(predicted.p_ok, is_guess)
+def _prediction(objective: Variable, fix: Fix, had: Mapping[str, Value]) -> str:
+    """A yes-or-no objective has a probability, any other a value beside that of this run: what the change costs."""
+    predicted, value = fix.predicted[objective.name], had.get(objective.name)
+    likely = None if predicted.p_ok is None else chance(predicted.p_ok, fix.is_guess)
     probability = likely or STATUS_WORDS[predicted.status()]
     if objective.kind == "functional":
         return f"predicted {objective.name}: {probability}"
     interval = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
-    return f"predicted {objective.name}: {interval}, {probability}"
+    now = f" (now {value:.4g})" if is_known(value) else ""
+    return f"predicted {objective.name}: {interval}{now}, {probability}"
 
 
 def _evidence(diagnosis: Diagnosis) -> Iterator[str]:

@@ -17,6 +17,8 @@ from care_core.tables.ingest import failures_table
 from care_core.tables.rows import ABOUT, write_rows
 from tests.conftest import Care
 
+pytestmark = pytest.mark.long
+
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
 DRIVE = bundled("samples", "move_base_drive.bag")
 

@@ -30,6 +30,8 @@ from tests.rewritten import write_text, write_ulog
 from tests.unit.test_mavlink import Station, flight, parameter
 from tests.whole import WHOLE
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
 TIMES = 200 if WHOLE else 60
