@@ -25,6 +25,8 @@ from care_core.starting import script_command
 from tests.campaigns import campaign_in, drive
 from tests.conftest import Care
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 
 pytest.importorskip("scipy")

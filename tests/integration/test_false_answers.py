@@ -14,6 +14,8 @@ from care_core.files import bundled
 from tests import restamped
 from tests.conftest import Care
 
+pytestmark = pytest.mark.long
+
 DATA = Path(__file__).parents[1] / "data"
 GOOD, FAILED = DATA / "arducopter_good.BIN", bundled("samples", "arducopter_failed.BIN")
 DRIVE = DATA / "move_base_good.bag"

@@ -21,6 +21,8 @@ from care_core.fleet.sources import Source, gather
 from care_core.parallel import Failed
 from tests.conftest import Care
 
+pytestmark = pytest.mark.long
+
 distributed = pytest.importorskip("distributed")
 
 FLIGHT = Path(__file__).parents[1] / "data" / "arducopter_good.BIN"
