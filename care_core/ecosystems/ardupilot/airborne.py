@@ -436,7 +436,8 @@ class Airborne(Armed):
         before = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost]
         just_before = (t for t, felt in before if felt > _SHOCK and t >= lost - _STRUCK_S)
         flown = [(t, felt) for t, felt in before if any(start <= t <= end for start, end in self.airborne)]
-        hard = (t for t, felt in flown if felt > _HARD * _SHOCK or self._stops_at(t))
+        moved = self.one("GPS", "Spd")
+        hard = (t for t, felt in flown if felt > _HARD * _SHOCK or _stops_at(moved, t))
         return min((*hard, *just_before), default=None)
 
     def _blows(self) -> Iterator[tuple[float, float]]:
@@ -450,17 +451,6 @@ class Airborne(Armed):
         for one in self.all("VIBE", "Clip"):
             clipped = np.append(False, np.diff(one["Clip"]) > 0)
             yield from ((t, 0.0) for t in one.t[clipped].tolist())
-
-    def _stops_at(self, at: float) -> bool:
-        """Whether it moved over ground until a time, and stood just after it."""
-        moved = self.one("GPS", "Spd")
-        if moved is None:
-            return False
-        before = moved["Spd"][(moved.t > at - _STOPS_S) & (moved.t < at)]
-        after = moved["Spd"][(moved.t >= at) & (moved.t < at + _STOPS_S)]
-        if not len(before) or not len(after):
-            return False
-        return float(before[-1]) > _MOVES_MS and float(np.min(after)) < _STOPPED * float(before[-1])
 
 
 def _first_above(series: tuple[Floats, Floats] | None, least: float, start: float, end: float) -> float | None:
@@ -493,3 +483,14 @@ def _up(roll: Floats, pitch: Floats) -> Floats:
     """The thrust axis in a level frame that turns with the vehicle, shape (3, n)."""
     r, p = np.radians(roll), np.radians(pitch)
     return np.stack((np.cos(r) * np.sin(p), -np.sin(r), np.cos(r) * np.cos(p)))
+
+
+def _stops_at(moved: Table | None, at: float) -> bool:
+    """Whether it moved over ground until a time, and stood just after it."""
+    if moved is None:
+        return False
+    before = moved["Spd"][(moved.t > at - _STOPS_S) & (moved.t < at)]
+    after = moved["Spd"][(moved.t >= at) & (moved.t < at + _STOPS_S)]
+    if not len(before) or not len(after):
+        return False
+    return float(before[-1]) > _MOVES_MS and float(np.min(after)) < _STOPPED * float(before[-1])

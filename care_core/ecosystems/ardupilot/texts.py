@@ -38,6 +38,9 @@ def is_routine(text: str) -> bool:
     return not text.strip() or _ROUTINE.match(text) is not None
 
 
+_NUMBERS = re.compile(r"\s*\([^)]*\d[^)]*\)")
+
+
 class Refusal(NamedTuple):
     """What the firmware says of why it cannot be armed."""
 
@@ -46,6 +49,11 @@ class Refusal(NamedTuple):
     why: str
     was_tried: bool
     """Whether somebody tried to arm it: "Arm: ...", not "PreArm: ..."."""
+
+    @property
+    def plain(self) -> str:
+        """Why, without the numbers that change from one complaint to the next."""
+        return _NUMBERS.sub("", self.why)
 
 
 def refusal_of(time_s: float, text: str) -> Refusal | None:

@@ -42,14 +42,14 @@ def find(flight: Flight) -> Iterator[Finding]:
     refusals, lasting = flight.refusals, standing(flight)
     if not lasting:
         return
-    counts = Counter(_plain(one.why) for one in lasting)
+    counts = Counter(one.plain for one in lasting)
     why = max(counts, key=lambda one: counts[one])
-    begin = next(one.time_s for one in refusals if _plain(one.why) == why)
+    begin = next(one.time_s for one in refusals if one.plain == why)
     asked = any(one.was_tried for one in refusals)
     severity: Severity = "critical" if asked else "warning"
     by_operator = all(_BY_OPERATOR.search(one.why) for one in lasting)
     suspect: SuspectKind = "operation" if by_operator else "parameter"
-    complaints = tuple(dict.fromkeys(_plain(one.why) for one in lasting))
+    complaints = tuple(dict.fromkeys(one.plain for one in lasting))
     finding = Finding(
         kind="prearm",
         title=f"arming was refused: {why}",
@@ -77,11 +77,6 @@ def _blaming(finding: Finding, blamed: tuple[Refusing, ...]) -> Finding:
         source="MSG, PARM; what each check reads: AP_Arming",
         probability=max(one.probability for one in blamed),
     )
-
-
-def _plain(why: str) -> str:
-    """A complaint without the numbers that change from one to the next."""
-    return re.sub(r"\s*\([^)]*\d[^)]*\)", "", why)
 
 
 CHECK = Check(

@@ -22,8 +22,6 @@ _TELLS = (4, 1)
 """From here on "Arm:" instead of "PreArm:" begins whatever an attempt to arm complains of (AP_Arming.cpp)."""
 _FEW = 2
 """Refusals that are told in one line."""
-_NUMBERS = re.compile(r"\s*\([^)]*\d[^)]*\)")
-"""What changes from one complaint to the next that is the same."""
 _STILL_S = 0.5
 """A complaint so shortly before the last attempt to arm stood when it was refused."""
 _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
@@ -48,7 +46,7 @@ def refused_for(mission: Mission) -> str:
     """What stood when arming was last refused, a few of it in words; empty where nothing was refused."""
     if not flight_of(mission).refusals:
         return ""
-    told = {_NUMBERS.sub("", one.why): one.why for one in last_refusals(mission)}
+    told = {one.plain: one.why for one in last_refusals(mission)}
     return listed(list(told.values())[:_FEW])
 
 

@@ -30,7 +30,7 @@ _CUT = LIMITS.add("probability that the stop made it fall", 0.9, "", "what has n
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     """The motor that gave way, or all that stopped, before control was lost in the air."""
-    commands, killed_s = motors.commands(flight), flight.killed_s() or math.inf
+    commands, killed_s = motors.commands(flight), next(iter(flight.kills), math.inf)
     if commands is None:
         return
     # What is asked of motors that a switch has cut tells of no motor.
