@@ -69,12 +69,26 @@ _ALIKE = {
 """Words of findings and metrics, and the word that the label of the signal has for it."""
 
 
+_GOAL = "distance to the goal"
+_MEASURED_ON = {
+    "time": (_GOAL, "speed", "speed forward", "height above home", "position down", "height"),
+    "energy": ("battery current", "energy drawn", "battery voltage"),
+    "success": (_GOAL,),
+}
+"""Words of objectives, and the labels of the signals that say most of what took so long, or so much; only those of
+robots on the ground are called speed alone."""
+_WAY = {"path", "corner"}
+"""Words of objectives and metrics that where the robot went shows better than any signal over time."""
+
+
 class Proof(Record):
     """What of a log shows something: signals, the most telling first, and the time that it is about, if it has one."""
 
     signals: tuple[Signal, ...]
     start_s: float | None = None
     end_s: float | None = None
+    is_way: bool = False
+    """Whether where the robot went shows it better than any signal over time."""
 
     def around(self, whole: tuple[float, float]) -> tuple[float, float]:
         """The time that it is about with as much before and behind, a tenth of the whole at least; else the whole."""
@@ -108,8 +122,23 @@ def proof_of(case: OpenRun, subject: Subject, signals: Sequence[Signal] | None =
     ranked = tuple(one for score, one in sorted(scores, key=lambda pair: -pair[0]) if score > 0)
     if isinstance(found, Finding):
         ranked = _compared(found, ranked)
-    is_span = isinstance(found, Finding) and found.end_s > found.onset_s
-    return Proof(ranked, found.onset_s, found.end_s) if is_span and isinstance(found, Finding) else Proof(ranked)
+    if isinstance(found, Finding):
+        span = (found.onset_s, found.end_s) if found.end_s > found.onset_s else (None, None)
+        return Proof(ranked, *span)
+    return Proof(ranked, is_way=_is_way(found, meaning(ranked[0].channel, ranked[0].field) if ranked else Field()))
+
+
+def _is_way(subject: Cause | ObjectiveResult, first: Field) -> bool:
+    """Whether the way shows a cause or an objective better than its first signal: how far a mission got is seen there,
+    too, unless the log says how far it was to the goal."""
+    words = {word for name in _nodes(subject)[:2] for word in name.split("_")}
+    is_place = isinstance(subject, Cause) and first.is_position
+    return bool(words & _WAY) or is_place or ("success" in words and first.label != _GOAL)
+
+
+def _nodes(subject: Cause | ObjectiveResult) -> list[str]:
+    """The names on the path of a cause, or that of an objective."""
+    return [node.name for node in subject.path] if isinstance(subject, Cause) else [subject.name]
 
 
 def _compared(finding: Finding, ranked: tuple[Signal, ...]) -> tuple[Signal, ...]:
@@ -133,15 +162,22 @@ def _finding_of(case: OpenRun, cause: Cause) -> Finding | Cause:
 def _score(subject: Subject, signal: Signal, field: Field) -> float:
     if isinstance(subject, Finding):
         return finding_score(subject, signal, field)
-    nodes = [node.name for node in subject.path] if isinstance(subject, Cause) else [subject.name]
+    nodes = _nodes(subject)
     # What stands right behind the parameter tells most of it; the objective itself has many signals.
     weights = {name: 1.0 / max(place, 1) for place, name in enumerate(nodes)}
     used = [weights[name] for name in signal.used_by if name in weights]
     words = _with_alike(word for name in nodes[:2] for word in name.split("_"))
+    told = _told_of(nodes[0], field) if isinstance(subject, ObjectiveResult) else 0.0
     if not used:
-        return 0.5 * _overlap(field, words & {"goal"})
+        return told or 0.5 * _overlap(field, words & {"goal"})
     share = len(used) / len(signal.used_by)
-    return max(used) + share + 2.0 * _overlap(field, words) - (0.9 if field.is_position else 0.0)
+    return told + max(used) + share + 2.0 * _overlap(field, words) - (0.9 if field.is_position else 0.0)
+
+
+def _told_of(objective: str, field: Field) -> float:
+    """How much the label of a signal promises to tell of an objective: more than any use of it where it is listed."""
+    labels = next((_MEASURED_ON[word] for word in objective.split("_") if word in _MEASURED_ON), ())
+    return 20.0 - 2.0 * labels.index(field.label) if field.label in labels else 0.0
 
 
 def finding_score(finding: Finding, signal: Signal, field: Field) -> float:

@@ -14,14 +14,16 @@ from care_core.text import clean
 from care_tui.messages import Judge
 from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to
+from care_tui.pages.proofs import place_rows, proof_rows
 from care_tui.render.health import FindingRow, fit_rows, health_row_details, health_row_item, health_rows
 from care_tui.render.objectives import run_rows
-from care_tui.render.rows import Rows, folded
+from care_tui.render.rows import Row, Rows, folded
 from care_tui.widgets.choices import Listing
 
 
 class AccountPage(DiagnosisPage):
     NAME = "log"
+    FITS = True
     HELP = (
         "What happened: findings, the first cause first with what it led to, then the events in order of time. p shows "
         "the signal that proves what is under the cursor, m the messages of its moment. z opens the details of the "
@@ -60,7 +62,18 @@ class AccountPage(DiagnosisPage):
         rows = [] if index is None else health_row_details(self._lines[index])
         rows += fit_rows(diagnosis, advice if isinstance(advice, list) else [])
         is_open = self._is_open or not rows
-        return Rows([*rows, *folded("This run", run_rows(diagnosis).rows, self.glyphs, is_open=is_open)])
+        rows += folded("This run", run_rows(diagnosis).rows, self.glyphs, is_open=is_open)
+        return Rows([*rows, *(() if is_open else self._figure(index, rows))])
+
+    def _figure(self, index: int | None, rows: list[Row]) -> list[Row]:
+        """Below these rows: the signal that shows a finding, or where the robot was at a moment."""
+        width, height = self.reader.room
+        left, subject, moment_s = height - len(Rows(rows).wrap(width)) - 1, self.subject(), self.moment_s()
+        if subject is not None:
+            shown = proof_rows(self, f"{index}", subject, width, left)
+        else:
+            shown = [] if moment_s is None else place_rows(self, moment_s, width, left)
+        return [Row(Content()), *shown] if shown else []
 
     def moment_s(self) -> float | None:
         return None if self.index is None or self.session.state != "data" else self._lines[self.index].time_s

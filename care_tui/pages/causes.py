@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, NamedTuple
 
-from textual import on
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Container
 from textual.content import Content
 
 from care_core.application.proof import Subject
@@ -16,9 +13,8 @@ from care_core.ecosystems.findings import Finding, every_finding
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.messages import Decided
-from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to
-from care_tui.pages.proofs import proof_rows
+from care_tui.pages.proven import LEAST_FIGURE, ProvenPage
 from care_tui.render.causes import (
     cause_item,
     doubt_rows,
@@ -32,11 +28,8 @@ from care_tui.render.causes import (
 from care_tui.render.health import hypothesis_rows
 from care_tui.render.rows import Row, Rows, folded, heading, labelled
 from care_tui.screens.prompt import Prompt
-from care_tui.widgets.choices import Choices, Listing
+from care_tui.widgets.choices import Listing
 from care_tui.widgets.reader import Reader
-
-FIGURE, LEAST_FIGURE = 14, 6
-"""Lines of the plot at most, and at least."""
 
 
 class Explanation(NamedTuple):
@@ -50,10 +43,10 @@ class Explanation(NamedTuple):
         return self.cause.option.name if self.cause else self.hypothesis.name if self.hypothesis else ""
 
 
-class CausesPage(DiagnosisPage):
+class CausesPage(ProvenPage):
     NAME = "causes"
     NOTHING = "no cause is named"
-    FITS = True
+    BESIDE = "Path and fix"
     HELP = (
         "What explains the fault, the likeliest first, with what this run shows of it, and the path that led to the "
         "fault. p opens the proof as a plot, z the statistics behind it. d sets a cause aside with a reason that "
@@ -70,14 +63,6 @@ class CausesPage(DiagnosisPage):
     _is_open = False
     _wanted: str | None = None
     """The cause that the cursor follows to its new place."""
-
-    def compose(self) -> ComposeResult:
-        with Container(id="left"):
-            yield Choices(self.glyphs, id="list")
-            side = Reader(self.glyphs, id="side")
-            side.border_title = "Path and fix"
-            yield side
-        yield Reader(self.glyphs, id="text")
 
     def enter(self) -> None:
         if self.has_content and self.session.fault is None:
@@ -197,18 +182,14 @@ class CausesPage(DiagnosisPage):
         doubt = doubt_rows(diagnosis)
         shown = evidence_rows(cause, diagnosis, session.dismissed)
         rows = [*(doubt if cause.is_lead else ()), *shown]
-        if self._is_wide:
-            return Rows([*rows, *self._figure(cause.option.name, cause, self._height(rows))])
+        if self.is_wide:
+            return Rows([*rows, *self.figure(cause.option.name, cause, self.height(rows))])
         path = [*self._path(cause), Row(Content())]
         # A low pane has a lower plot, so that the path is in view with it; a very low one has it below.
-        around = self._height([*rows, *path])
-        figure = self._figure(cause.option.name, cause, around)
+        around = self.height([*rows, *path])
+        figure = self.figure(cause.option.name, cause, around)
         is_first = self.reader.room.height - around >= LEAST_FIGURE
         return Rows([*rows, *(figure if is_first else path), *(path if is_first else figure), *self._worth(cause)])
-
-    def _height(self, rows: list[Row]) -> int:
-        """Lines that rows take."""
-        return len(Rows(rows).wrap(self.reader.room.width))
 
     def _path(self, cause: Cause) -> list[Row]:
         assert self.session.result is not None
@@ -236,45 +217,18 @@ class CausesPage(DiagnosisPage):
         if finding is None:
             return Rows(rows)
         first = [labelled("Seen by", finding.evidence)] if finding.evidence else []
-        figure = self._figure(finding.title, finding, self._height(first))
-        return Rows([*first, *figure, *(() if self._is_wide else rows)])
+        figure = self.figure(finding.title, finding, self.height(first))
+        return Rows([*first, *figure, *(() if self.is_wide else rows)])
 
-    def _figure(self, name: str, subject: Subject, around: int) -> list[Row]:
-        """The proof as a plot in what room so many lines around it leave."""
-        room = self.reader.room
-        height = min(max(room.height - around, LEAST_FIGURE), FIGURE if not self._is_wide else 2 * FIGURE)
-        return proof_rows(self, name, subject, room.width, height)
-
-    @property
-    def _is_wide(self) -> bool:
-        """Whether cause, proof and fix stand together."""
-        return self.screen.has_class("-wide") or self.screen.has_class("-widest")
-
-    def show_text(self, *, from_top: bool = True) -> None:
-        super().show_text(from_top=from_top)
-        self._show_side()
-
-    def show(self, index: int | None = None) -> None:
-        super().show(index)
-        self._show_side()
-
-    def _show_side(self) -> None:
-        side, here = self.query_one("#side", Reader), self._here
-        rows = self._beside(here) if here is not None and self._is_wide else []
-        side.display = bool(rows)
-        if rows:
-            side.show(Rows(rows))
-
-    def _beside(self, here: Explanation) -> list[Row]:
-        """What stands beside the proof: the path of a cause and what its change brings, or all about a finding."""
+    def beside(self) -> list[Row]:
+        """The path of a cause and what its change brings, or all about a finding."""
+        here = self._here
+        if here is None:
+            return []
         if here.cause is not None and self.session.result is not None:
             return self._of_cause(here.cause)
         finding = here.hypothesis and self._finding(here.hypothesis)
         return hypothesis_rows(here.hypothesis, finding) if here.hypothesis and finding else []
-
-    @on(Reader.Fitted, "#side")
-    def _side_fits(self, event: Reader.Fitted) -> None:
-        event.stop()
 
     # What the keys do
 

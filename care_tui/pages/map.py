@@ -5,12 +5,10 @@ from __future__ import annotations
 from textual.content import Content
 
 from care_core.application.track import Way, way_of
-from care_core.report.marks import marks_of
 from care_tui.pages.page import Page, View, view_of
+from care_tui.pages.proofs import WAY, grave_marks
 from care_tui.render.map import map_rows
 from care_tui.render.rows import Rows
-
-WAY = "way"
 
 
 class MapPage(Page):
@@ -23,7 +21,7 @@ class MapPage(Page):
         return view_of("Map", found, self._show)
 
     def _show(self, way: Way) -> View:
-        marks = [mark for mark in marks_of(self.session.diagnosis) if mark.severity != "info"]
+        marks = grave_marks(self.session.diagnosis)
         width, height = self.reader.room
         return View(
             Content("Track and the way asked for" if way.legs else "Track; the log names no way that was asked for"),

@@ -14,14 +14,15 @@ from care_core.records import replace
 from care_core.text import clean
 from care_core.variables import Threshold
 from care_tui.messages import Judge
-from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.page import View, enter_to, sentence
+from care_tui.pages.proven import LEAST_FIGURE, ProvenPage
 from care_tui.render.objectives import counted, objective_detail, objective_item, run_rows
-from care_tui.render.rows import Rows, folded
+from care_tui.render.rows import Row, Rows, folded
 from care_tui.screens.prompt import Prompt
 from care_tui.widgets.choices import Listing
 
 NAME_WIDTH = 18
+JUDGED = "How it was judged"
 
 
 def _wrong(bound: Threshold | None, typed: str) -> str:
@@ -37,9 +38,9 @@ def _wrong(bound: Threshold | None, typed: str) -> str:
     return "No mission can keep a limit of 0 or less." if is_beyond_reach else ""
 
 
-class ObjectivesPage(DiagnosisPage):
+class ObjectivesPage(ProvenPage):
     NAME = "objectives"
-    FITS = True
+    BESIDE = JUDGED
     NOTHING = "nothing is judged"
     HELP = (
         "What the mission is judged by. Enter shows what caused the fault under the cursor, else the first fault that "
@@ -66,7 +67,8 @@ class ObjectivesPage(DiagnosisPage):
             lambda i: results[i].variable.name,
         )
         title = Content(f"Objectives: {counted(results)}")
-        return View(title, self._detail, listing, self.session.objective, "How it was judged")
+        about = "What it is measured on" if self._has_figure(self.session.objective) else JUDGED
+        return View(title, self._detail, listing, self.session.objective, about)
 
     @property
     def _mine(self) -> dict[str, float]:
@@ -74,14 +76,40 @@ class ObjectivesPage(DiagnosisPage):
         return dict(self.workspace.request.thresholds) if self.workspace.request else {}
 
     def _detail(self, index: int | None) -> Rows:
-        diagnosis, case = self.session.diagnosis, self.session.case
+        diagnosis = self.session.diagnosis
         if index is None:
             return run_rows(diagnosis)
+        if self._has_figure(index):
+            return Rows(self._figure(index, 0))
+        rows = self._judged(index, self.reader.room.width)
+        around = self.height(rows) + 2
+        is_low = self._is_open or self.reader.room.height - around < LEAST_FIGURE
+        return Rows([*rows, *(() if is_low else [Row(Content()), *self._figure(index, around)])])
+
+    def _judged(self, index: int, width: int) -> list[Row]:
+        """How an objective was judged, and where the run came from, folded."""
+        diagnosis, case = self.session.diagnosis, self.session.case
         result = diagnosis.objectives[index]
         reference = case.reading.judged.reference.config if case and case.reading else {}
         summary = case.model.summary_at(result.variable.name, reference) if case and case.model else None
-        rows = objective_detail(result, summary, self.glyphs, self.reader.room.width)
-        return Rows([*rows, *folded("This run", run_rows(diagnosis).rows, self.glyphs, is_open=self._is_open)])
+        rows = objective_detail(result, summary, self.glyphs, width)
+        return [*rows, *folded("This run", run_rows(diagnosis).rows, self.glyphs, is_open=self._is_open)]
+
+    def _figure(self, index: int, around: int) -> list[Row]:
+        """What the objective is measured on."""
+        result = self.session.diagnosis.objectives[index]
+        return self.figure(result.name, result, around)
+
+    def _has_figure(self, index: int | None) -> bool:
+        """Whether the figure has a pane of its own."""
+        return index is not None and self.is_wide and bool(self._figure(index, 0))
+
+    def beside(self) -> list[Row]:
+        """How it was judged, beside the figure."""
+        index = self.index
+        if index is None or not self._has_figure(index):
+            return []
+        return self._judged(index, self.choices.room.width - 1)  # as wide as the list, but for the text's margin
 
     def moved(self, index: int) -> None:
         self.session.objective = index

@@ -1,4 +1,4 @@
-"""The plot that proves what is under the cursor, as part of a page's text."""
+"""The plot or the map that proves what is under the cursor, as part of a page's text."""
 
 from __future__ import annotations
 
@@ -7,12 +7,20 @@ from textual.content import Content
 from care_core.application.case import Case
 from care_core.application.proof import Proof, Subject, meanings, proof_of
 from care_core.application.signals import Signal, signals_of, trace_of, whole_of
+from care_core.application.track import Way, way_of
+from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError
-from care_core.report.marks import marks_of
+from care_core.report.marks import Mark, marks_of
 from care_tui.pages.page import Page
+from care_tui.render.map import map_rows
 from care_tui.render.plot import AXIS, Figure, dots_across
 from care_tui.render.rows import ASCII, Row
 from care_tui.session import Session
+
+LEAST, LEAST_MAP = 6, 10
+"""Lines below which a plot shows nothing, and a map."""
+WAY = "way"
+"""The question where the robot went."""
 
 
 def signals_in(session: Session, case: Case) -> list[Signal]:
@@ -35,18 +43,24 @@ def figure_of(case: Case, signal: Signal, proof: Proof, span: tuple[float, float
 
 
 def proof_rows(page: Page, name: str, subject: Subject, width: int, height: int) -> list[Row]:
-    """The figure that proves a subject, drawn when a thread has read it; nothing where no signal shows it.
+    """What proves a subject, drawn when a thread has read it: the way where it is a matter of the way, else a signal
+    over time; nothing where neither shows it.
 
     Args:
         name: tells the subject from others of this page.
     """
     case, session = page.session.case, page.session
-    if case is None or case.log is None or height < 6:
+    if case is None or case.log is None or height < LEAST:
         return []
     columns = dots_across(max(width - AXIS, 10), ascii=page.glyphs is ASCII)
 
-    def work() -> Figure | None:
+    def work() -> Figure | Way | None:
         proof = proof_of(case, subject, signals_in(session, case))
+        if proof.is_way and height >= LEAST_MAP:
+            try:
+                return way_of(case)
+            except CareError:  # it says no place in both directions
+                pass
         for signal in proof.signals[:3]:
             try:
                 return figure_of(case, signal, proof, proof.around(whole_of(case)), columns)
@@ -54,8 +68,28 @@ def proof_rows(page: Page, name: str, subject: Subject, width: int, height: int)
                 continue
         return None
 
-    question = f"proof {name} {columns}"
+    question = f"proof {name} {columns} {height >= LEAST_MAP}"
     answer = page.fetched(question, work)
+    if isinstance(answer, Way):
+        return _drawn(page, answer, width, height)
     if isinstance(answer, Figure):
-        return [*answer.rows(width, height, page.glyphs), Row(Content())]
-    return [] if page.has_answer(question) else [Row(Content("Looking for the signal that shows it..."))]
+        return answer.rows(width, height, page.glyphs)
+    return [] if page.has_answer(question) else [Row(Content("Looking for what shows it..."))]
+
+
+def place_rows(page: Page, moment_s: float, width: int, height: int) -> list[Row]:
+    """Where the robot was at a moment, on the map of its way; nothing where the log does not say."""
+    case = page.session.case
+    if case is None or case.log is None or height < LEAST_MAP:
+        return []
+    way = page.fetched(WAY, lambda: way_of(case))
+    return _drawn(page, way, width, height, moment_s) if isinstance(way, Way) else []
+
+
+def _drawn(page: Page, way: Way, width: int, height: int, here_s: float | None = None) -> list[Row]:
+    return map_rows(way, grave_marks(page.session.diagnosis), width, height, page.glyphs, here_s)
+
+
+def grave_marks(diagnosis: Diagnosis) -> list[Mark]:
+    """What a map marks: a sign for each moment would cover the way."""
+    return [mark for mark in marks_of(diagnosis) if mark.severity != "info"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 from textual.content import Content
@@ -12,10 +12,12 @@ from care_core.report.marks import Mark
 from care_core.text import figures
 from care_tui.render.health import sign_of
 from care_tui.render.plot import ACTUAL, WANTED, assembled, dot_sign
-from care_tui.render.rows import ASCII, Glyphs, Row
+from care_tui.render.rows import ASCII, Glyphs, Row, Rows
 
 _TALL = 2.0
 """How much higher than wide a cell is."""
+_RULER = 10
+"""Cells of the ruler."""
 
 
 class _Canvas:
@@ -55,28 +57,39 @@ class _Canvas:
         return {cell: sign if self.ascii else dot_sign(bits) for cell, bits in found.items()}
 
 
-def map_rows(way: Way, marks: Sequence[Mark], width: int, height: int, glyphs: Glyphs) -> list[Row]:
-    """The map in so many cells, with what its signs mean."""
+def map_rows(
+    way: Way, marks: Sequence[Mark], width: int, height: int, glyphs: Glyphs, here_s: float | None = None
+) -> list[Row]:
+    """The map in so many cells, with what its signs mean.
+
+    Args:
+        here_s: the time of which the place is marked, seconds of the log.
+    """
     told = [(_at(way, mark.time_s), sign_of(mark, glyphs)) for mark in marks]
-    seen = {sign for _, sign in told}
-    meant = [f"{sign} {word}" for sign, word in ((glyphs.fault, "fault"), ("!", "warning")) if sign in seen]
-    canvas = _Canvas(way, width, max(height - 2 - bool(meant), 4), ascii=glyphs is ASCII)
+    legend = _legend(way, {sign for _, sign in told}, glyphs, is_here=here_s is not None)
+    room = 1 + len(Rows([legend]).wrap(width))
+    canvas = _Canvas(way, width, max(height - room, 4), ascii=glyphs is ASCII)
     legs = canvas.cells(canvas.line(way.legs), dotted=True) if way.legs else {}
     drawn = {cell: (sign, WANTED) for cell, sign in legs.items()}
     drawn |= {cell: (sign, ACTUAL) for cell, sign in canvas.cells(canvas.line(way.track)).items()}
     faults = [(point, sign) for point, sign in told if sign == glyphs.fault]
     # What is drawn later covers what was there: both ends stay in view beneath nothing but a fault.
     ends = [(way.track[0], "S"), (way.track[-1], "E")]
-    for point, sign in (*((corner, "o") for corner in way.legs), *told, *ends, *faults):
+    here = [] if here_s is None else [(_at(way, here_s), "@")]
+    for point, sign in (*((corner, "o") for corner in way.legs), *told, *ends, *faults, *here):
         x, y = canvas.dot(point)
         drawn[x // canvas.across, y // canvas.down] = sign, "bold $text-error" if sign == glyphs.fault else "bold"
     rows = [Row(assembled([drawn.get((x, y), (" ", "")) for x in range(canvas.width)])) for y in range(canvas.height)]
-    scale = f"{figures(canvas.metres * 10, 2)} m"
-    asked = Content.assemble(("  ... asked for, o its corners", WANTED) if way.legs else "")
-    legend = Content.assemble(
-        f"{glyphs.rule * 10} {scale}  ", (f"{glyphs.root} track", ACTUAL), "  S start  E end", asked
-    )
-    return [*rows, Row(Content()), Row(legend), *([Row(Content("  ".join(meant)))] if meant else [])]
+    scale = f"{glyphs.rule * _RULER} {figures(canvas.metres * _RULER, 2)} m"
+    return [*rows, Row(Content(scale)), legend]
+
+
+def _legend(way: Way, seen: Collection[str], glyphs: Glyphs, *, is_here: bool) -> Row:
+    """What the signs of a map mean."""
+    asked = ("  ... asked for, o its corners", WANTED) if way.legs else ""
+    here = "  @ here" if is_here else ""
+    meant = "".join(f"  {sign} {word}" for sign, word in ((glyphs.fault, "fault"), ("!", "warning")) if sign in seen)
+    return Row(Content.assemble((f"{glyphs.root} track", ACTUAL), "  S start  E end", here, meant, asked))
 
 
 def _at(way: Way, time_s: float) -> Point:

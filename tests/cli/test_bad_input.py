@@ -31,9 +31,10 @@ def log(tmp_path: Path) -> Path:
 def refused(care: Care, code: int, words: str, *args: object) -> None:
     outcome = care(*map(str, args))
     assert (outcome.code, outcome.stdout) == (code, ""), outcome
-    assert outcome.stderr.startswith("care: ")
-    assert words in outcome.stderr
-    assert outcome.stderr.count("\n") == 1
+    lines = outcome.stderr.splitlines()
+    (said,) = [line for line in lines if not line.endswith(" ...")]  # a slow machine says what it is at
+    assert said.startswith("care: ")
+    assert words in said
 
 
 @pytest.mark.parametrize("command", ["triage", "params", "whatif", "verify", "apply"])

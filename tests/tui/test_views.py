@@ -19,6 +19,7 @@ from care_tui.render.plot import dots_across, plot
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
 from care_tui.settings import Settings
+from care_tui.widgets.reader import Reader
 from care_tui.widgets.tab_row import TabRow
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
@@ -227,6 +228,26 @@ async def test_the_path_of_a_cause_is_in_view_however_low_the_terminal(size: tup
         await settle(pilot, "3")
         for line in ("LAND_SPEED    16 cm/s", "landing_time  66.13 s", "mission_time  164.7 s", "limit <= 145.6 s"):
             assert line in shown(app)
+
+
+async def test_a_wide_screen_shows_what_an_objective_is_measured_on_and_where_a_moment_was() -> None:
+    app = CareApp(Request(bundled("samples", "px4_failed.ulg")), settings=Settings(places=()))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "2")
+        assert "● track" in text(app), "of the way the map shows most"
+        assert "o its corners" in text(app)
+        side = walk(app).page.query_one("#side", Reader)
+        assert "Threshold" in side.plain
+        assert side.display
+        await settle(pilot, "up", "up")
+        assert "position down" in text(app), "of the time a signal"
+        await settle(pilot, "1", "G")
+        assert "@ here" in text(app)
+        await settle(pilot, "z")
+        assert "@ here" not in text(app), "the details have the room"
+        await pilot.resize_terminal(80, 24)
+        await settle(pilot, "z", "2")
+        assert "Threshold" in text(app), "a narrow screen has how it was judged"
 
 
 @needs_sample

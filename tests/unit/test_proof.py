@@ -45,6 +45,13 @@ def test_a_motor_is_shown_beside_another_around_the_time_it_failed(motor: Case) 
     assert Proof((), 11.0, 19.0).around((10.0, 20.0)) == (10.0, 20.0)
 
 
+def test_what_is_measured_on_the_way_is_shown_by_the_way() -> None:
+    case = care_core.triage(bundled("samples", "px4_failed.ulg"))
+    shown = {one.name: proof_of(case, one).is_way for one in case.diagnosis.objectives}
+    assert shown == {"mission_success": True, "mission_time": False, "energy": False, "path_error_max": True}
+    assert proof_of(case, case.diagnosis.faults[0].causes[0]).is_way
+
+
 @pytest.mark.parametrize(
     ("title", "signal"),
     [
