@@ -125,8 +125,10 @@ class Advice(Record):
     """The same without it; None for a remembered run."""
     is_guess: bool = False
     """Whether a value of the change is one that no training run came near."""
+    cause: float | None = None
+    """Probability that what is changed caused the failure; None where it is not among what explains it."""
     confidence: Confidence | None = None
-    """How sure the cause is that the change mends."""
+    """How well training supports that."""
     by_hand: bool = False
     """Whether the operator chose the change: what is predicted of it is told, and nobody advises it."""
     why: str = ""
@@ -137,12 +139,20 @@ class Advice(Record):
     def __str__(self) -> str:
         if not self.change:
             return f"No change advised: {self.refusal}" if self.refusal else ""
-        sure = f" ({self.confidence} confidence in the cause)" if self.confidence else ""
-        change = f"Chosen by hand: {self.change}" if self.by_hand else f"Change {self.change}{sure}"
+        change = f"Chosen by hand: {self.change}" if self.by_hand else f"Change {self.change}{self._sure}"
         why = f"; {self.why}" if self.why else ""
         if self.by_hand and not helps(self.odds, self.odds_as_driven):
             why = f"; it is not predicted to help{why}"
         return f"{change}: {promise(self.odds, self.odds_as_driven, self.is_guess)}{why}"
+
+    @property
+    def _sure(self) -> str:
+        """How likely it is the cause, and how well that is supported."""
+        if self.confidence is None:
+            return ""
+        if self.cause is None:
+            return f" ({self.confidence} confidence in the cause)"
+        return f" ({percent(self.cause)} the cause, {self.confidence} confidence)"
 
 
 class Verdict(Record):
@@ -233,6 +243,12 @@ def why_of(shown_by: str, abstained: str | None, otherwise: str) -> str:
     return f"this run shows it: {shown_by}" if shown_by else otherwise
 
 
+def share_of(changed: Collection[str], hypotheses: Sequence[Hypothesis]) -> float | None:
+    """Probability that these parameters caused the failure; None where none of them is among what explains it."""
+    shares = [one.probability for one in hypotheses if one.what == "parameter" and one.name in changed]
+    return min(sum(shares), 1.0) if shares else None
+
+
 def _advice(diagnosis: Diagnosis) -> Advice:
     fix = diagnosis.fix
     if fix is None:
@@ -244,6 +260,7 @@ def _advice(diagnosis: Diagnosis) -> Advice:
         odds=fix.odds,
         odds_as_driven=diagnosis.odds_as_driven,
         is_guess=fix.is_guess,
+        cause=share_of(changed, diagnosis.hypotheses),
         confidence=next((cause.confidence for cause in causes if cause.option.name in changed), None),
         by_hand=fix.by_hand,
         why=clean(why_of(fix.shown_by, diagnosis.abstained, diagnosis.why_this)),

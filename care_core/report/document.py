@@ -28,7 +28,18 @@ from care_core.diagnose.records import (
     Status,
     outcome,
 )
-from care_core.diagnose.verdict import Advice, Verdict, alone, chance, compose, promise, reasons_of, verdict_of, why_of
+from care_core.diagnose.verdict import (
+    Advice,
+    Verdict,
+    alone,
+    chance,
+    compose,
+    promise,
+    reasons_of,
+    share_of,
+    verdict_of,
+    why_of,
+)
 from care_core.numbers import six_digits
 from care_core.records import Meta, field
 from care_core.report.entries import (
@@ -406,6 +417,7 @@ def _advice(document: TriageDocument) -> Advice:
         odds=fix.odds,
         odds_as_driven=document.odds_as_driven,
         is_guess=fix.guess,
+        cause=share_of(changed, document.hypotheses),
         confidence=next((cause.confidence for cause in causes if cause.option in changed), None),
         by_hand=fix.by_hand,
         why=why_of(fix.shown_by, document.abstained, fix.why_this),

@@ -113,6 +113,16 @@ def test_a_parameter_that_is_to_stay_is_not_put_back() -> None:
     assert next_step(free, has_failed=True) == "put A back as the findings say"
 
 
+def test_a_change_says_how_likely_it_is_the_cause_beside_how_well_that_is_supported() -> None:
+    made = failed(LATE, fixed=True)
+    named, other = Hypothesis("parameter", "land_speed", 0.7), Hypothesis("parameter", "max_speed", 0.2)
+    told = replace(made, hypotheses=(named, other))
+    assert "land_speed 16 -> 50 (70% the cause, " in str(verdict_of(told).advice)
+    document = remembered(published(build_document(told)))
+    assert str(remembered_verdict(document).advice) == str(verdict_of(told).advice)
+    assert "confidence in the cause" in str(verdict_of(replace(made, hypotheses=(other,))).advice)
+
+
 @pytest.mark.parametrize(("odds", "helps"), [(0.9, True), (0.2, False), (0.01, False)])
 def test_what_an_operator_chose_is_told_with_its_odds_and_never_suggested(odds: float, helps: bool) -> None:
     made = replace(failed(LATE, fixed=True), odds_as_driven=0.2, why_this="of the suggestion")
@@ -120,7 +130,7 @@ def test_what_an_operator_chose_is_told_with_its_odds_and_never_suggested(odds: 
     chosen = replace(made, fix=replace(made.fix, p_fixed=odds, by_hand=True), why_this="")
     told = verdict_of(chosen)
     assert str(told.advice).startswith("Chosen by hand: land_speed 16 -> 50: ")
-    assert "confidence in the cause" not in str(told.advice)
+    assert "confidence" not in str(told.advice)
     assert ("it is not predicted to help" in str(told.advice)) is not helps
     assert ("make the change" in told.next_step) is helps
     document = remembered(published(build_document(chosen)))
