@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, open_case, predict
 from care_core.application.configuring import DiffSide, apply_to_files, commands_of, diff_of, doubts_of
-from care_core.application.history_writing import remember_triage
+from care_core.application.history_writing import remember, remember_triage
 from care_core.application.reporting import report_of
 from care_core.errors import CareError
 from care_core.records import Record
@@ -17,6 +17,7 @@ from care_core.report.formats import FORMATS, Format
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.report.document import TriageDocument
 
 _ESCAPES = re.compile(r"\\([!-/:-@\[-`{-~])")
 """A sign that Markdown is told to leave as it is."""
@@ -43,6 +44,18 @@ def comparison_of(a: Request, b: Request, progress: Progress) -> Callable[[int],
 
     document = compare(a, b, progress).document()
     return lambda width: comparison_text(document, width)
+
+
+def verification_of(case: Case, report: TriageDocument, thresholds: Mapping[str, float]) -> Callable[[int], str]:
+    """What became in this run of what an earlier report promised, in lines of whatever width is asked for; it is
+    remembered as by `care verify`. Raises CareError."""
+    from care_core.application.verifying import held_against
+    from care_core.report.verification import verify_text
+
+    document = held_against(report, Path(report.log.path), case, thresholds)
+    verified = document.plain()
+    remember(lambda history: history.add_verification(verified))
+    return lambda width: verify_text(document, width)
 
 
 def preview_of(case: Case, format: Format) -> str:
@@ -72,6 +85,7 @@ class Engine(Record):
     save: Callable[[Path, str], None] = save_text
     remember: Callable[[Diagnosis, Request], CareError | None] = remember_triage
     compare: Callable[[Request, Request, Progress], Callable[[int], str]] = comparison_of
+    verify: Callable[[Case, TriageDocument, Mapping[str, float]], Callable[[int], str]] = verification_of
     apply: Callable[[Case, Fix], list[tuple[Path, Path]]] = apply_to_files
     doubts: Callable[[Case, Fix], tuple[str, ...]] = doubts_of
 

@@ -103,11 +103,11 @@ def verify(
         CareError: the report is none, suggests no change or one of no parameter of its profile, no such profile is
             installed, or the log cannot be read.
     """
-    from care_core.diagnose.verify import verify as hold_against
+    from care_core.application.verifying import held_against
     from care_core.profile.store import load_profile
     from care_core.report.reading import read_report
     from care_core.report.suggested import report_profile
-    from care_core.report.verification import promise_of, verify_document
+    from care_core.report.verification import promise_of
 
     if isinstance(report, (str, Path)):
         promised, path = read_report(report), Path(report)
@@ -116,7 +116,7 @@ def verify(
     good = None if reference is None else Path(reference)
     asked = log if isinstance(log, Request) else Request(Path(log), profile, mission=mission, reference=good)
     chosen = load_profile(asked.profile) if asked.profile else report_profile(promised, path)
-    promise = promise_of(promised, chosen.schema, path)
+    promise_of(promised, chosen.schema, path)  # a report that promises nothing is refused before a log is read
     case = open_case(replace(asked, profile=str(chosen.path)), _silent)
     if case.reading is None and case.log is not None:
         try:  # a run without a mission is compared, one of another robot is not
@@ -126,9 +126,7 @@ def verify(
                 raise
             hint = f"The report is of profile '{chosen.schema.name}': give a later log of the robot that it is of."
             raise ProfileError(err.message, hint=hint, where=err.where) from err
-    schema = chosen.schema if case.reading is None else case.reading.profile.schema
-    verification = hold_against(promise, case.diagnosis, schema, asked.thresholds)
-    return verify_document(promised, case.diagnosis.run, verification)
+    return held_against(promised, path, case, asked.thresholds, chosen)
 
 
 def apply(

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from care_core.diagnose.verdict import RunStatus
     from care_core.ecosystems.findings import Event
     from care_core.history.store import Triaged
+    from care_core.report.document import TriageDocument
     from care_core.run import FitVerdict
 
 
@@ -97,6 +98,8 @@ class Past(Record):
     cause: str
     judged_with: str
     """The options that gave it other limits or another reference than its own."""
+    advice: str
+    report: TriageDocument
     values: Mapping[str, float | None]
     config: Mapping[str, float]
 
@@ -157,13 +160,16 @@ def _past(triaged: Triaged) -> Past:
     from care_core.report.reading import remembered
 
     document = remembered(triaged.document)
+    verdict = remembered_verdict(document)
     return Past(
         at=triaged.at,
         log=triaged.log_path,
         mission=triaged.mission,
         profile=document.profile.name if document.profile else "",
         fit=document.fit.verdict,
-        verdict=remembered_verdict(document).headline,
+        verdict=verdict.headline,
+        advice=str(verdict.advice),
+        report=document,
         cause=leading_cause(document),
         judged_with=triaged.judged_with,
         values={entry.name: entry.value for entry in document.objectives},

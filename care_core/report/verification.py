@@ -34,7 +34,7 @@ from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import profile_of
 from care_core.report.suggested import BY_HAND, BY_REPORTS, fix_sets, suggested_changes
 from care_core.run import Run
-from care_core.text import clean, percent, wrapped
+from care_core.text import WIDTH, clean, percent, wrapped
 from care_core.variables import Threshold
 
 SCHEMA_ID: Final = "care.verify/1"
@@ -215,39 +215,44 @@ def verify_json(document: VerifyDocument) -> str:
     return document.to_json()
 
 
-def verify_text(document: VerifyDocument) -> str:
-    """The verification in lines: the verdict, the changes, the objectives."""
-    return "\n".join(_lines(document)) + "\n"
+def verify_text(document: VerifyDocument, width: int = WIDTH) -> str:
+    """The verification in lines of at most `width` columns: the verdict, the changes, the objectives."""
+    head = [("", document.sentence), ("", ""), *_head(document), ("", "")]
+    lines = [line for first, text in head for line in wrapped(text, first, width=width) or [""]]
+    lines += [_changes_title(document)]
+    for text in (*map(_change_line, document.changes), *map(_other_line, document.other_changes)):
+        lines += wrapped(text, "  ", " " * 18, width)
+    lines += ["", "Objectives"]
+    names = max((len(one.after.name) for one in document.objectives), default=0)
+    for one in document.objectives:
+        shown = f"{STATUS_WORDS[one.after.status]:<13}  {one.after.name:<{names}}  {_outcome(one)}"
+        lines += wrapped(shown, "  ", " " * 17, width)
+        lines += wrapped(one.after.reason, " " * 17, width=width) if one.after.reason else []
+    return "\n".join(lines) + "\n"
 
 
-def _lines(document: VerifyDocument) -> Iterator[str]:
-    yield from wrapped(document.sentence)
-    yield ""
-    yield from wrapped(f"{Path(document.report_log.path).name}, profile {document.profile.name}", "Report  ")
-    yield from wrapped(Path(document.log.path).name, "Log     ")
-    yield from wrapped(document.triage, "Triage  ")
-    for note in document.notes:
-        yield from wrapped(note, "  ! ")
-    yield ""
+def _head(document: VerifyDocument) -> Iterator[tuple[str, str]]:
+    yield "Report  ", f"{Path(document.report_log.path).name}, profile {document.profile.name}"
+    yield "Log     ", Path(document.log.path).name
+    yield "Triage  ", document.triage
+    yield from (("  ! ", note) for note in document.notes)
+
+
+def _changes_title(document: VerifyDocument) -> str:
     which = f" of alternative {document.alternative}" if document.alternative else ""
     odds = document.p_fixed
     promised = "odds not measured" if odds is None else f"promised at {percent(odds)}{beside(document.odds_as_driven)}"
-    yield f"Changes{which} ({promised})"
-    for change in document.changes:
-        driven = "" if change.driven is None or change.made == "made" else f" ({change.driven:g} was driven)"
-        note = f"; {change.note}" if change.note else ""
-        yield clean(
-            f"  {_MADE_WORDS[change.made]:<14}  {change.option}  {change.from_:g} -> {change.to:g}{driven}{note}"
-        )
-    for other in document.other_changes:
-        yield clean(f"  also changed    {other.option}  {other.from_:g} -> {other.to:g}")
-    yield ""
-    yield "Objectives"
-    width = max((len(one.after.name) for one in document.objectives), default=0)
-    for one in document.objectives:
-        yield clean(f"  {STATUS_WORDS[one.after.status]:<13}  {one.after.name:<{width}}  {_outcome(one)}")
-        if one.after.reason:
-            yield from wrapped(one.after.reason, " " * 17)
+    return f"Changes{which} ({promised})"
+
+
+def _change_line(change: CheckedChange) -> str:
+    driven = "" if change.driven is None or change.made == "made" else f" ({change.driven:g} was driven)"
+    note = f"; {change.note}" if change.note else ""
+    return f"{_MADE_WORDS[change.made]:<14}  {change.option}  {change.from_:g} -> {change.to:g}{driven}{note}"
+
+
+def _other_line(other: OtherChangeEntry) -> str:
+    return f"also changed    {other.option}  {other.from_:g} -> {other.to:g}"
 
 
 def _outcome(one: CheckedObjective) -> str:

@@ -31,7 +31,7 @@ from care_tui.render.rows import (
 from care_tui.widgets.choices import Listing
 
 NAME_WIDTH, VALUE_WIDTH, LOG_WIDTH = 18, 16, 26
-RUNS, WHOLE = "runs", "both logs"
+RUNS, WHOLE, CHECK = "runs", "both logs", "what became of it"
 TREND = 24
 """Newest runs that a trend shows."""
 
@@ -40,16 +40,20 @@ class HistoryPage(Page):
     FITS = True
     HELP = (
         "Runs that were triaged before, the newest first, with the trend of every objective up to the one under the "
-        "cursor. Enter opens its log. x marks a run; then every other is compared with it, and Enter puts both logs "
-        "side by side in full. / filters, Esc leaves."
+        "cursor. Enter opens its log. c tells whether the change that it was advised was made in the open log, and "
+        "what that brought. x marks a run; then every other is compared with it, and Enter puts both logs side by "
+        "side in full. / filters, Esc leaves."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Open its log"),
         Binding("x", "mark", "Compare", id="history.mark"),
+        Binding("c", "check", "Check its change", id="history.check"),
     ]
     _marked: Past | None = None
     _compared: tuple[Past, Past] | None = None
     """The marked run and the one whose log was put beside it in full."""
+    _checked: Past | None = None
+    """The run whose advice is held against the open log."""
 
     def enter(self) -> None:
         self.forget(RUNS)
@@ -77,7 +81,9 @@ class HistoryPage(Page):
         return View(title, lambda i: Rows([]) if i is None else self._beside(runs[i], i, runs), listing)
 
     def _beside(self, past: Past, index: int, runs: list[Past]) -> Rows:
-        """What stands beside a run: both logs in full where that was asked for."""
+        """What stands beside a run: what became of its advice, or both logs in full, where that was asked for."""
+        if self._checked == past:
+            return self._became(past)
         if self._marked is None or self._compared != (self._marked, past):
             return Rows(self._detail(index, runs))
         one, other = (Request(Path(run.log), mission=run.mission or None) for run in self._compared)
@@ -88,6 +94,29 @@ class HistoryPage(Page):
         if whole is None:
             return sentence("Putting both side by side...")
         return plain_rows(whole(self.reader.room.width))
+
+    def _became(self, past: Past) -> Rows:
+        """What the change that a run was advised brought in the open log."""
+        case, request, verify = self.session.case, self.workspace.request, self.workspace.engine.verify
+        assert case is not None
+        bounds = {} if request is None else request.thresholds
+        told = self.fetched(CHECK, lambda: verify(case, past.report, bounds))
+        if isinstance(told, CareError):
+            return error_rows(told)
+        if told is None:
+            return sentence("Holding it against this run...")
+        return plain_rows(told(self.reader.room.width))
+
+    @property
+    def _may_check(self) -> bool:
+        """Whether the run under the cursor was advised a change, and another log is open that may have it."""
+        past, case = self._here, self.session.case
+        if past is None or past.report.fix is None or case is None:
+            return False
+        return past.report.log.sha256 != case.diagnosis.run.log.sha256
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        return self._may_check if action == "check" else super().check_action(action, parameters)
 
     def _item(self, past: Past) -> Content:
         mark = "*" if past == self._marked else " "
@@ -110,6 +139,8 @@ class HistoryPage(Page):
             rows.append(labelled("Judged", f"with {past.judged_with}, not by its own limits"))
         if past.cause:
             rows.append(labelled("Cause", past.cause))
+        if past.report.fix is not None:
+            rows.append(labelled("Advice", past.advice))
         until = [run for run in reversed(runs[index:]) if run.profile == past.profile]
         up_to_it = f"{number_of(len(until), 'run')} up to it"
         rows += [Row(Content()), _columns("Objective", "this run", up_to_it, "bold")]
@@ -151,6 +182,12 @@ class HistoryPage(Page):
             return
         self._compared = self._marked, past
         self.forget(WHOLE)
+        self.show_text()
+
+    def action_check(self) -> None:
+        """Tell whether the change that this run was advised was made in the open log, and what it brought."""
+        self._checked = None if self._checked == self._here else self._here
+        self.forget(CHECK)
         self.show_text()
 
     def action_mark(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -125,6 +126,27 @@ async def test_enter_puts_a_run_and_the_marked_one_side_by_side_in_full() -> Non
         assert "mission_time" in text(app), "of another pair what the history knows comes first"
         await settle(pilot, "enter")
         assert "No such file." in text(app)
+
+
+async def test_c_tells_whether_the_change_of_a_past_run_was_made_and_what_it_brought() -> None:
+    assert remember_triage(run_of(1, 187.0, 16.0)) is None
+    after = run_of(42, 120.0, 50.0)
+    kept = tuple(
+        replace(one, status="ok", value=120.0) if one.name == "mission_time" else one for one in after.objectives
+    )
+    engine = fake_engine(lambda _request, _progress: Case(replace(after, objectives=kept, faults=(), fix=None)))
+    app = CareApp(Request(LOG), engine=replace(engine, remember=remember_triage), settings=Settings(places=()))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "y")
+        assert "Check its change" not in shown(app), "of the open log itself"
+        await settle(pilot, "j")
+        assert "Advice" in text(app)
+        await settle(pilot, "c")
+        assert re.search(r"NOT MADE +LAND_SPEED +16 -> 50 \(16 was", text(app))
+        assert re.search(r"OK +mission_time +187(.0)? -> 120", text(app))
+        assert len(store().verifications()) == 1, "it is remembered as by care verify"
+        await settle(pilot, "c")
+        assert "Advice" in text(app)
 
 
 async def test_enter_opens_the_log_of_a_past_run() -> None:
