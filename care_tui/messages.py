@@ -46,6 +46,8 @@ class OpenLog(Message):
     """Another log is to be opened."""
 
     path: Path
+    mission: int | None = None
+    """Which of its missions, None for the one that was asked for before, else the last."""
 
 
 @dataclass

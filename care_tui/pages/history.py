@@ -178,7 +178,8 @@ class HistoryPage(Page):
         if past is None:
             return
         if self._marked is None or not self._is_beside:
-            self.post_message(OpenLog(Path(past.log)))
+            is_last = past.mission >= len(past.report.missions)  # which is judged where none is asked for
+            self.post_message(OpenLog(Path(past.log), None if is_last else past.mission))
             return
         self._compared = self._marked, past
         self.forget(WHOLE)

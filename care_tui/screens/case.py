@@ -25,7 +25,7 @@ from care_core.diagnose.records import Fix
 from care_core.diagnose.verdict import verdict_of
 from care_core.ecosystems.findings import Health
 from care_core.errors import CareError
-from care_core.records import Record
+from care_core.records import Record, replace
 from care_core.text import clean
 from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Answered, Decided, Go, Judge, OpenLog, Progressed
@@ -277,11 +277,12 @@ class CaseScreen(Screen[None]):
     @on(OpenLog)
     async def _open(self, event: OpenLog) -> None:
         event.stop()
-        await self.open_log(event.path)
+        await self.open_log(event.path, event.mission)
 
-    async def open_log(self, path: Path) -> None:
+    async def open_log(self, path: Path, mission: int | None = None) -> None:
         """Diagnose a log by what belongs to it; what was chosen for the one before is gone."""
         before, request = self.workspace.request, self.workspace.request_for(path)
+        request = request if mission is None else replace(request, mission=mission)
         if before is not None and (left_behind := " and ".join(left_out(before, request))):
             told = f"Judged by itself: {left_behind} stayed with {before.log.name}."
             self.app.notify(clean(told), markup=False)

@@ -11,7 +11,7 @@ import pytest
 
 from care_core.application.case import Case, Request
 from care_core.application.history_writing import remember_triage
-from care_core.diagnose.records import Diagnosis
+from care_core.diagnose.records import Diagnosis, MissionVerdict
 from care_core.errors import CareError
 from care_core.history.store import History
 from care_core.records import replace
@@ -149,19 +149,20 @@ async def test_c_tells_whether_the_change_of_a_past_run_was_made_and_what_it_bro
         assert "Advice" in text(app)
 
 
-async def test_enter_opens_the_log_of_a_past_run() -> None:
-    for number in (1, 2):
-        assert remember_triage(run_of(number, 140.0, 50.0)) is None
-    asked: list[Path] = []
+async def test_enter_opens_the_mission_of_a_past_run() -> None:
+    done = run_of(1, 140.0, 50.0)
+    two = [MissionVerdict(replace(done.run.mission, index=index), "ok", "") for index in (1, 2)]
+    assert remember_triage(replace(done, missions=tuple(two))) is None
+    asked: list[tuple[Path, int | None]] = []
 
     def diagnose(request: Request, _progress: object) -> Case:
-        asked.append(request.log)
+        asked.append((request.log, request.mission))
         return Case(run_of(42, 187.0, 16.0))
 
     app = CareApp(Request(LOG), engine=fake_engine(diagnose), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "y", "j", "enter")
-        assert asked == [LOG, Path("/flights/00000001.BIN")]
+        assert asked == [(LOG, None), (Path("/flights/00000001.BIN"), 1)]
         assert "mission_time" in items(app), "the objectives of that log are shown"
 
 
