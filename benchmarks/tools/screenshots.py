@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from textual.pilot import Pilot
@@ -24,8 +25,10 @@ from care_tui.app import CareApp
 from care_tui.page_names import STEPS
 from care_tui.settings import Settings
 
-SIZE = (80, 24)
+SIZE, WIDE = (80, 24), (120, 36)
 SAMPLE = "arducopter_failed.BIN"
+WIDE_OF = {SAMPLE: "wide-signal", "px4_failed.ulg": "wide-map"}
+"""Samples whose causes are drawn on a wide screen: one that a signal proves, and one that the way proves."""
 PAGE, COMPARED = (900, 2280), (900, 2300)
 _ROOT = Path(__file__).parents[2]
 PAIRS = {
@@ -43,16 +46,25 @@ QUIET = (
 
 
 async def draw(folder: Path) -> None:
-    """Walk through the steps and save each as SVG."""
+    """Walk through the steps and save each as SVG, and cause, proof and fix side by side."""
     os.chdir(bundled("samples"))  # as an operator stands beside the log: no path of this machine in the pictures
-    app = CareApp(Request(Path(SAMPLE), top=10), settings=Settings(theme="textual-dark", places=(Path(),)))
-    async with app.run_test(size=SIZE) as pilot:
-        for number, page in enumerate(STEPS, start=1):
+    await _walk(
+        folder, SAMPLE, SIZE, {page.keys: f"{number}-{page.name}" for number, page in enumerate(STEPS, start=1)}
+    )
+    for sample, name in WIDE_OF.items():
+        await _walk(folder, sample, WIDE, {"3": name})
+
+
+async def _walk(folder: Path, sample: str, size: tuple[int, int], pictures: Mapping[str, str]) -> None:
+    """Save what the app shows after each key, by the names of the pictures."""
+    app = CareApp(Request(Path(sample), top=10), settings=Settings(theme="textual-dark", places=(Path(),)))
+    async with app.run_test(size=size) as pilot:
+        for keys, name in pictures.items():
             await _rest(pilot)
-            await pilot.press(page.keys)
+            await pilot.press(keys)
             await _rest(pilot)
-            picture = folder / f"{number}-{page.name}.svg"
-            write_atomically(picture, app.export_screenshot(title=f"care {SAMPLE}", simplify=True))
+            picture = folder / f"{name}.svg"
+            write_atomically(picture, app.export_screenshot(title=f"care {sample}", simplify=True))
             print(picture)
 
 
