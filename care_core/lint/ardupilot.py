@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from difflib import get_close_matches
+from collections.abc import Collection, Iterator, Sequence
 
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Kind
-from care_core.lint.generic import problem_at
+from care_core.lint.generic import meant_instead, problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import ardupilot
 from care_core.metadata.aliases import aliases_of
@@ -26,8 +25,6 @@ _KINDS: dict[str, Kind] = {"C": "copter", "P": "quadplane", "R": "rover", "S": "
 _LISTS = f"{ardupilot.SOURCE}s of 3.4 to 4.8"
 _HEAD = 12
 """Lines in which ground stations say of what vehicle a file is."""
-_ALIKE = 0.84
-"""Least likeness of a name to the one that is meant, of difflib: one letter off in names of seven and more."""
 _RATIOS = ((100.0, "centimetres or hundredths"), (1000.0, "thousandths"))
 _COMPLETE = (4, 1)
 """The lists of earlier releases leave many parameters out: groups of helicopters and controllers."""
@@ -89,25 +86,12 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
 
 
 def _unknown(file: ConfigFile, entry: Entry) -> Problem:
-    held = {one.name for one in file.entries}
-    close = [
-        name
-        for name in get_close_matches(entry.name, _alike(entry.name), n=3, cutoff=_ALIKE)
-        if name not in held and _digits(name) == _digits(entry.name)
-    ]
-    if close:
+    meant = meant_instead(entry.name, {one.name for one in file.entries}, ardupilot.names())
+    if meant:
         text = f"No release of ArduPilot has a parameter {entry.name}."
-        return problem_at("unknown-key", Severity.WARNING, file, entry, text, f"Did you mean {close[0]}?", _LISTS)
+        return problem_at("unknown-key", Severity.WARNING, file, entry, text, f"Did you mean {meant}?", _LISTS)
     text = f"ArduPilot's lists have no parameter {entry.name}: a script's, a custom build's, or one before 3.4."
     return problem_at("unknown-key", Severity.NOTE, file, entry, text, "Check its spelling.", _LISTS)
-
-
-def _alike(name: str) -> list[str]:
-    return [known for known in ardupilot.names() if known[:1] == name[:1] and abs(len(known) - len(name)) <= 2]
-
-
-def _digits(name: str) -> list[str]:
-    return re.findall(r"\d+", name)
 
 
 def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[Release], is_told: bool) -> Problem:
@@ -204,7 +188,6 @@ def _listed(fact: Fact) -> str:
     return f"They are {', '.join(codes[:12])}{', ...' if len(codes) > 12 else ''}."
 
 
-def is_of_vehicle(names: Iterable[str]) -> bool:
-    """Whether these are ArduPilot's parameters, not PX4's: the two share few names."""
-    held = list(names)
-    return sum(bool(ardupilot.known_in(name)) for name in held) * 2 > len(held)
+def known(names: Collection[str]) -> float:
+    """The share of these that are ArduPilot's parameters: it has few names in common with PX4."""
+    return sum(bool(ardupilot.known_in(name)) for name in names) / max(len(names), 1)

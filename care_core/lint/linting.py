@@ -9,7 +9,7 @@ from care_core.configs.driven import option_value, readable
 from care_core.configs.loading import split_name
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.errors import UsageError, nearest
-from care_core.lint import ardupilot, contradictions, generic, navigation
+from care_core.lint import ardupilot, contradictions, generic, navigation, px4
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.reading import read_file
 from care_core.metadata.navigation import DISTRIBUTIONS
@@ -19,7 +19,7 @@ from care_core.run import Setting
 if TYPE_CHECKING:
     from care_core.profile.schema import Schema
 
-_VEHICLES = ("copter", "plane", "rover", "sub", "tracker", "blimp")
+_VEHICLES = ("copter", "plane", "rover", "sub", "tracker", "blimp", "px4")
 _MAY_BE_ELSEWHERE = frozenset({"unknown-key", "misplaced-key", "not-loaded"})
 
 
@@ -35,8 +35,8 @@ def lint(names: Sequence[str], target: str = "", schema: Schema | None = None) -
 
     Args:
         names: `FILE`, or for ROS `NAMESPACE=FILE`.
-        target: the distribution or firmware that the files are for (`noetic`, `humble`, `copter-4.6`); told from the
-            files where it is empty.
+        target: the distribution or firmware that the files are for (`noetic`, `humble`, `copter-4.6`, `px4-1.15`);
+            told from the files where it is empty.
         schema: of a profile, whose ranges are checked as well.
 
     Raises:
@@ -50,7 +50,9 @@ def _check_target(target: str) -> None:
     ros = [name for several in DISTRIBUTIONS.values() for name in several]
     vehicle = target.partition("-")[0].removeprefix("ardu")
     if target and target not in ros and vehicle not in _VEHICLES:
-        hint = nearest(target, [*ros, *_VEHICLES]) or "Write a distribution (humble) or a firmware (copter-4.6)."
+        hint = (
+            nearest(target, [*ros, *_VEHICLES]) or "Write a distribution (humble) or a firmware (copter-4.6, px4-1.15)."
+        )
         raise UsageError(f"No tables for '{target}'.", hint=hint, where="--target")
 
 
@@ -70,8 +72,11 @@ def _of_ecosystem(file: ConfigFile, target: str) -> Iterator[Problem]:
         return
     values = {entry.name: entry for entry in file.entries}
     yield from contradictions.pairs(file, values, contradictions.VEHICLE_PAIRS)
-    if ardupilot.is_of_vehicle(values):
-        yield from ardupilot.check(file, "" if target in _all_distributions() else target)
+    firmware = "" if target in _all_distributions() else target
+    is_px4 = firmware.startswith("px4") if firmware else px4.known(values) > ardupilot.known(values)
+    rules = px4 if is_px4 else ardupilot
+    if rules.known(values) > 0.5:
+        yield from rules.check(file, firmware)
 
 
 def _all_distributions() -> set[str]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
 from care_core.files import read_small_text
-from care_core.metadata.fact import Fact, expanded, number
+from care_core.metadata.fact import Fact, codes, expanded, number
 from care_core.metadata.words import word_of
 from care_core.records import Record
 
@@ -104,20 +104,14 @@ def _fact(name: str, row: _Row, releases: Iterable[Release]) -> Fact:
         f"{SOURCE}, {span}",
         low=number(low),
         high=number(high),
-        values=tuple((code, "") for code in _codes(values)),
-        bits=frozenset(int(code) for code in _codes(bits)),
+        values=tuple((code, "") for code in codes(values)),
+        bits=frozenset(int(code) for code in codes(bits)),
         unit=unit,
         reboot="R" in flags,
         read_only="O" in flags,
         releases=span,
         line=word_of("ardupilot", name).line,
     )
-
-
-def _codes(text: str) -> Iterator[float]:
-    for part in text.split("|") if text else ():
-        first, dots, last = part.partition("..")
-        yield from map(float, range(int(first), int(last) + 1)) if dots else [float(part)]
 
 
 @cache

@@ -49,6 +49,13 @@ def number(text: str) -> float | None:
     return float(text) if text else None
 
 
+def codes(text: str) -> Iterator[float]:
+    """The numbers of a cell: `0..3|10` is 0, 1, 2, 3 and 10."""
+    for part in text.split("|") if text else ():
+        first, dots, last = part.partition("..")
+        yield from map(float, range(int(first), int(last) + 1)) if dots else [float(part)]
+
+
 def expanded(pattern: str) -> Iterator[str]:
     """The names of a family: {1..16} stands for each of the numbers, {|2|A} for nothing, 2 or A; a name for itself."""
     before, brace, rest = pattern.partition("{")

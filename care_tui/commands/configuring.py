@@ -85,7 +85,10 @@ def lint(
         list[str], typer.Argument(metavar="CONFIG...", help="Configuration files, for ROS also NAMESPACE=FILE.")
     ],
     target: Annotated[
-        str, typer.Option("--target", "-t", help="What they are for: noetic, humble, copter-4.6; told by them else.")
+        str,
+        typer.Option(
+            "--target", "-t", help="What they are for: noetic, humble, copter-4.6, px4-1.15; told by them else."
+        ),
     ] = "",
     profile: Annotated[str | None, profile_option("Check against this profile's acceptable values as well.")] = None,
     as_json: AsJson = False,

@@ -1,0 +1,135 @@
+"""Rules for the parameters of PX4: names by release, types, ranges, listed values."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+
+from care_core.ecosystems.vehicles.self_written import is_self_written
+from care_core.lint.generic import meant_instead, problem_at
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.metadata import px4
+from care_core.metadata.fact import Fact
+
+_VERSION = re.compile(r"^#\s*Version:\s*(\d+\.\d+)", re.MULTILINE)
+_LISTS = f"{px4.SOURCE}s of {px4.RELEASES[0]} to {px4.RELEASES[-1]}"
+_FAR = 2.0
+"""The firmware checks no range: what lies beyond one by less than this factor is worth a note alone."""
+_UNSET = (0.0, -1.0)
+"""Values that say "off", "not known" or "not set" of many parameters."""
+
+
+def releases_of(file: ConfigFile, target: str) -> tuple[tuple[str, ...], bool]:
+    """The releases that a file may be for, and whether anybody says so.
+
+    Args:
+        target: what the operator says: `px4-1.15`; empty where nothing is said.
+    """
+    told = target.partition("-")[2] if target else _header(file.text)
+    if told in px4.RELEASES:
+        return (told,), True
+    counts = Counter(release for entry in file.entries for release in px4.known_in(entry.name))
+    most = max(counts.values(), default=0)
+    return tuple(release for release in px4.RELEASES if counts[release] == most), False
+
+
+def _header(text: str) -> str:
+    """The release that QGroundControl writes above the parameters."""
+    match = _VERSION.search(text)
+    return match[1] if match else ""
+
+
+def check(file: ConfigFile, target: str) -> Iterator[Problem]:
+    """What is wrong with a file of PX4's parameters."""
+    releases, is_told = releases_of(file, target)
+    is_newer = not target and _number(_header(file.text)) > _number(px4.RELEASES[-1])
+    for entry in file.entries:
+        known = px4.known_in(entry.name)
+        if not known:
+            yield from () if is_newer else (_unknown(file, entry),)
+        elif not known & set(releases):
+            yield _elsewhere(file, entry, releases, is_told=is_told)
+        elif not is_self_written(entry.name):
+            yield from _value(file, entry, px4.facts_of(entry.name, releases))
+
+
+def _number(release: str) -> tuple[int, ...]:
+    return tuple(map(int, release.split("."))) if release else ()
+
+
+def _unknown(file: ConfigFile, entry: Entry) -> Problem:
+    meant = meant_instead(entry.name, {one.name for one in file.entries}, px4.names())
+    if meant:
+        text = f"No release of PX4 from {px4.RELEASES[0]} on has a parameter {entry.name}."
+        return problem_at("unknown-key", Severity.WARNING, file, entry, text, f"Did you mean {meant}?", _LISTS)
+    text = f"PX4's lists have no parameter {entry.name}: a custom build's, or of an older release."
+    return problem_at("unknown-key", Severity.NOTE, file, entry, text, "Check its spelling.", _LISTS)
+
+
+def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[str], *, is_told: bool) -> Problem:
+    """A name of other releases than those the file is for."""
+    told = px4.span(releases) if is_told else f"the releases that know most of this file ({px4.span(releases)})"
+    text = f"{entry.name} is not in {told}, but in {px4.span(px4.known_in(entry.name))}."
+    severity = Severity.WARNING if is_told else Severity.NOTE
+    return problem_at("unknown-key", severity, file, entry, text, "Is the file for this firmware?", _LISTS)
+
+
+def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
+    """A value that no release that the file may be for documents; the default of one always is."""
+    value = entry.number
+    if value is None or any(value == fact.default_number for fact in facts):
+        return
+    fact, unit = facts[-1], f" {facts[-1].unit}" if facts[-1].unit else ""
+    if all(one.type in ("int", "bool") for one in facts) and not value.is_integer():
+        text = f"{entry.name} is {value:g}, and PX4 counts it in whole numbers."
+        yield problem_at("wrong-type", Severity.WARNING, file, entry, text, "", fact.source)
+    elif all(one.bits for one in facts):
+        yield from _bits(file, entry, int(value), facts)
+    elif all(one.values for one in facts):
+        if not any(value == code for one in facts for code, _ in one.values):
+            text = f"{entry.name} is {value:g}, which is none of the values of {fact.source}."
+            yield problem_at("not-in-values", Severity.WARNING, file, entry, text, _listed(fact), fact.source)
+    elif not any(_within(value, one) for one in facts):
+        severity = Severity.WARNING if all(_is_far(value, one) for one in facts) else Severity.NOTE
+        text = f"{entry.name} is {value:g}{unit}, outside {_range(fact)}."
+        hint = "The firmware takes it all the same."
+        yield problem_at("out-of-range", severity, file, entry, text, hint, fact.source)
+
+
+def _bits(file: ConfigFile, entry: Entry, value: int, facts: Sequence[Fact]) -> Iterator[Problem]:
+    known = frozenset().union(*(fact.bits for fact in facts))
+    unknown = [bit for bit in range(32) if value >> bit & 1 and bit not in known] if value > 0 else []
+    if unknown:
+        text = f"{entry.name} is {value}: bit {', '.join(map(str, unknown))} means nothing to {facts[-1].source}."
+        yield problem_at("not-in-values", Severity.NOTE, file, entry, text, "", facts[-1].source)
+
+
+def _within(value: float, fact: Fact) -> bool:
+    near = 1e-6 * max(abs(fact.low or 0.0), abs(fact.high or 0.0))
+    return (fact.low is None or value >= fact.low - near) and (fact.high is None or value <= fact.high + near)
+
+
+def _is_far(value: float, fact: Fact) -> bool:
+    """Whether a value is of another magnitude, or sign, than the documented ones."""
+    if value in _UNSET:
+        return False
+    is_above = fact.high is not None and fact.high > 0 and value > _FAR * fact.high
+    is_below = fact.low is not None and (value < 0 <= fact.low or 0 < value < fact.low / _FAR)
+    return is_above or is_below
+
+
+def _range(fact: Fact) -> str:
+    if fact.high is None:
+        return f"{fact.low:g} and above"
+    return f"up to {fact.high:g}" if fact.low is None else f"{fact.low:g} to {fact.high:g}"
+
+
+def _listed(fact: Fact) -> str:
+    listed = [f"{code:g}" for code, _ in fact.values]
+    return f"They are {', '.join(listed[:12])}{', ...' if len(listed) > 12 else ''}."
+
+
+def known(names: Collection[str]) -> float:
+    """The share of these that are PX4's parameters."""
+    return sum(bool(px4.known_in(name)) for name in names) / max(len(names), 1)
