@@ -20,6 +20,7 @@ from care_core.files import (
     write_atomically,
 )
 from care_core.logs.opening import is_recording
+from care_core.text import clean
 
 TEXT_SIGNATURE = "Written by care.\n"
 """The last line of plain text in a file."""
@@ -144,12 +145,16 @@ def write_binary(path: Path, content: bytes, kind: str, *, force: bool = False, 
         raise cannot_write(path, err) from err
 
 
-def signed(text: str, *, parameters: bool = False) -> str:
+def signed_parameters(text: str, firmware: str = "") -> str:
+    """Parameters as a file of this program holds them, with the firmware that they are of, where that is known."""
+    about = f"# Firmware: {clean(firmware)}\n" if firmware else ""
+    return f"{PARAMETERS_SIGNATURE}{about}{text}" if text else text
+
+
+def signed(text: str) -> str:
     """A text that has no mark of its own, as a file of this program holds it."""
     if not text:
         return text
-    if parameters:
-        return f"{PARAMETERS_SIGNATURE}{text}"
     return f"{text}{'' if text.endswith(chr(10)) else chr(10)}{chr(10)}{TEXT_SIGNATURE}"
 
 

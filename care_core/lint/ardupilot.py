@@ -15,7 +15,9 @@ from care_core.metadata.aliases import aliases_of
 from care_core.metadata.ardupilot import Release
 from care_core.metadata.fact import Fact
 
-_VEHICLE_LINE = re.compile(r"#.*\b(copter|helicopter|multirotor|plane|rover|sub|tracker|blimp)\b", re.IGNORECASE)
+_VEHICLE_LINE = re.compile(
+    r"#.*\b(?:ardu)?(copter|helicopter|multirotor|plane|rover|sub|tracker|blimp)\b", re.IGNORECASE
+)
 _VERSION_LINE = re.compile(r"#.*?\b[Vv]?(?:ersion:?\s*)?(\d\.\d+)\b")
 _LETTERS = {
     "copter": "C", "helicopter": "C", "multirotor": "C", "plane": "P", "rover": "R", "sub": "S", "tracker": "T",

@@ -12,7 +12,7 @@ from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import px4
 from care_core.metadata.fact import Fact
 
-_VERSION = re.compile(r"^#\s*Version:\s*(\d+\.\d+)", re.MULTILINE)
+_VERSION = re.compile(r"^#\s*(?:Version:|Firmware: PX4)\s*v?(\d+\.\d+)", re.MULTILINE)
 _LISTS = f"{px4.SOURCE}s of {px4.RELEASES[0]} to {px4.RELEASES[-1]}"
 _FAR = 2.0
 """The firmware checks no range: what lies beyond one by less than this factor is worth a note alone."""
@@ -35,7 +35,7 @@ def releases_of(file: ConfigFile, target: str) -> tuple[tuple[str, ...], bool]:
 
 
 def _header(text: str) -> str:
-    """The release that QGroundControl writes above the parameters."""
+    """The release that QGroundControl, or `care params`, writes above the parameters."""
     match = _VERSION.search(text)
     return match[1] if match else ""
 

@@ -136,9 +136,9 @@ def _told(edited: Sequence[EditedFile]) -> Iterator[str]:
 
 
 def _write_or_print(text: str, out: Path | None, *, force: bool) -> None:
-    from care_core.outputs import signed
+    from care_core.outputs import signed_parameters
 
-    emit(text if out is None else signed(text, parameters=True), out, force=force)
+    emit(text if out is None else signed_parameters(text), out, force=force)
     if out is not None:
         say("load it after the other files")
 

@@ -51,7 +51,7 @@ def params(
     from care_core.configs.driven import differing, remark
     from care_core.configs.formats import format_for, write_params
     from care_core.logs.opening import open_log
-    from care_core.outputs import signed
+    from care_core.outputs import signed_parameters
 
     opened = open_log(log)
     histories = opened.settings()
@@ -67,7 +67,7 @@ def params(
     remarks = {name: remark(history, source=sources) for name, history in histories.items() if changed or sources}
     settings = {name: history[-1] for name, history in histories.items()}
     text = write_params(settings, format_for(opened.format.name, settings), remarks)
-    emit(text if out is None else signed(text, parameters=True), out, force=force)
+    emit(text if out is None else signed_parameters(text, opened.facts.get("firmware", "")), out, force=force)
 
 
 @app.command()

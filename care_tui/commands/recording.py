@@ -37,7 +37,7 @@ def record(
 ) -> None:
     """Print what to record for a profile. For ROS it is the recorder's command, for a vehicle its log settings."""
     from care_core.application.recording import recording_text, what_to_record
-    from care_core.outputs import signed
+    from care_core.outputs import signed_parameters
 
     found = what_to_record(name, topic or ())
     if found.stack == "vehicle":
@@ -45,7 +45,7 @@ def record(
             raise UsageError("A vehicle records by itself.", hint="Load the settings with your ground station.")
         if out is not None:
             check_writable(out)
-        emit(found.parameter_file if out is None else signed(found.parameter_file, parameters=True), out, force=force)
+        emit(found.parameter_file if out is None else signed_parameters(found.parameter_file), out, force=force)
         return
     place = out or Path(f"run-{datetime.now():%Y-%m-%d-%H-%M-%S}")
     if not run:

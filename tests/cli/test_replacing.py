@@ -10,7 +10,7 @@ from care_core.configs.formats import write_params
 from care_core.ecosystems.ardupilot.dialect import ARDUPILOT_PARAM
 from care_core.errors import ExitCode, UsageError
 from care_core.files import bundled, read_small_bytes
-from care_core.outputs import check_replaceable, kind_of, signed, write_output
+from care_core.outputs import check_replaceable, kind_of, signed_parameters, write_output
 from care_core.run import Setting
 from care_core.tables import ingest as ingesting
 from care_core.tables.ingest import failures_table
@@ -146,7 +146,7 @@ def test_what_is_written_already_is_no_strangers(tmp_path: Path) -> None:
 def test_a_report_does_not_replace_a_site_or_a_parameter_file(care: Care, tmp_path: Path) -> None:
     for name, content in {
         "site.yaml": "schema: care.site/1\nlimits: {}\n",
-        "vehicle.yaml": signed("LAND_SPEED: 50\n", parameters=True),
+        "vehicle.yaml": signed_parameters("LAND_SPEED: 50\n"),
     }.items():
         (tmp_path / name).write_text(content)
         assert care("triage", SAMPLE, "--no-history", "--yaml", "--out", tmp_path / name).code == ExitCode.USAGE
@@ -160,7 +160,7 @@ def test_a_parameter_file_is_signed_in_a_comment_of_every_dialect(care: Care, tm
         assert path.read_text().startswith("# Written by care.\n")
         assert care("diff", path, log).code == ExitCode.OK
     written = write_params({"A": Setting("A", 1.0, "")}, ARDUPILOT_PARAM)
-    assert kind_of(signed(written, parameters=True).encode()) == "parameters"
+    assert kind_of(signed_parameters(written).encode()) == "parameters"
 
 
 def test_the_journal_of_a_table_replaces_no_download(care: Care, tmp_path: Path) -> None:

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from care_core.files import bundled
 from care_core.lint.linting import lint
 from care_core.lint.problems import Problem
 from care_core.metadata import px4
+from tests.conftest import Care
 
 PLAIN = {
     "MC_ROLLRATE_P": 0.15,
@@ -92,3 +94,16 @@ def test_families_and_releases_of_the_table() -> None:
     assert (old.default, new.default) == ("900", "10000")
     assert all(low is None or high is None or low <= high for name in px4.names() for one in px4.facts_of(name)
                for low, high in [(one.low, one.high)])  # fmt: skip
+
+
+@pytest.mark.parametrize(("sample", "told"), [("px4_failed.ulg", "PX4 1.15"), ("arducopter_failed.BIN", "Copter 4.5")])
+def test_a_file_that_care_wrote_says_which_firmware_it_is_of(
+    sample: str, told: str, tmp_path: Path, care: Care
+) -> None:
+    path = tmp_path / "driven.params"
+    assert care("params", str(bundled("samples", sample)), "--out", str(path)).code == 0
+    assert "# Firmware: " in path.read_text().splitlines()[1]
+    path.write_text(path.read_text() + ("1\t1\tSYS_USE_IO\t1\t6\n" if told.startswith("PX4") else "LAND_SPD_MS,0.5\n"))
+    (problem,) = (one for one in lint([str(path)])[0].problems if one.parameter in ("SYS_USE_IO", "LAND_SPD_MS"))
+    assert problem.severity.value == "warning"
+    assert told in problem.text
