@@ -14,6 +14,7 @@ from care_core.metadata.fact import Fact
 
 _VERSION = re.compile(r"^#\s*(?:Version:|Firmware: PX4)\s*v?(\d+\.\d+)", re.MULTILINE)
 _LISTS = f"{px4.SOURCE}s of {px4.RELEASES[0]} to {px4.RELEASES[-1]}"
+_TRANSLATED = "param_translation.cpp of PX4, which translates files of older releases"
 _FAR = 2.0
 """The firmware checks no range: what lies beyond one by less than this factor is worth a note alone."""
 _UNSET = (0.0, -1.0)
@@ -70,6 +71,11 @@ def _unknown(file: ConfigFile, entry: Entry) -> Problem:
 def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[str], *, is_told: bool) -> Problem:
     """A name of other releases than those the file is for."""
     told = px4.span(releases) if is_told else f"the releases that know most of this file ({px4.span(releases)})"
+    new, factor = px4.RENAMED.get(entry.name, ("", 1.0))
+    if px4.known_in(new) & set(releases):
+        hint = f"Write {new}{'' if factor == 1 else f', and its value times {factor:.4g}'}."
+        severity = Severity.WARNING if is_told else Severity.NOTE
+        return problem_at("renamed", severity, file, entry, f"{entry.name} is {new} in {told}.", hint, _TRANSLATED)
     text = f"{entry.name} is not in {told}, but in {px4.span(px4.known_in(entry.name))}."
     severity = Severity.WARNING if is_told else Severity.NOTE
     return problem_at("unknown-key", severity, file, entry, text, "Is the file for this firmware?", _LISTS)

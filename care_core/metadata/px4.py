@@ -13,6 +13,27 @@ from care_core.records import Record
 _TABLE = Path(__file__).with_name("px4.tsv")
 RELEASES = ("1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12", "1.13", "1.14", "1.15", "1.16", "1.17", "1.18")
 SOURCE = "PX4's parameter reference"
+RENAMED: Mapping[str, tuple[str, float]] = {
+    **{f"MPC_{axis}_VEL_{gain}": (f"MPC_{axis}_VEL_{gain}_ACC", 20.0) for axis in ("XY", "Z") for gain in "PID"},
+    **{f"EKF2_GPS_POS_{axis}": (f"SENS_GPS0_OFF{axis}", 1.0) for axis in "XYZ"},
+    **{f"PWM_{old}": (f"PWM_MAIN_{new}", 1.0)
+       for old, new in (("MIN", "MIN"), ("MAX", "MAX"), ("RATE", "RATE"), ("DISARMED", "DISARM"))},
+    "LED_RGB_MAXBRT": ("SYS_RGB_MAXBRT", 1 / 15),
+    "VT_DWN_PITCH_MAX": ("VT_PITCH_MIN", -1.0),
+    **{old: (new, 1.0) for old, new in (
+        ("MC_DTERM_CUTOFF", "IMU_DGYRO_CUTOFF"), ("EKF2_GPS_MASK", "SENS_GPS_MASK"), ("EKF2_GPS_TAU", "SENS_GPS_TAU"),
+        ("ASPD_STALL", "FW_AIRSPD_STALL"), ("NAV_GPSF_LT", "FW_GPSF_LT"), ("NAV_GPSF_R", "FW_GPSF_R"),
+        ("IMU_GYRO_NF_FREQ", "IMU_GYRO_NF0_FRQ"), ("IMU_GYRO_NF_BW", "IMU_GYRO_NF0_BW"),
+        ("VT_PTCH_MIN", "VT_PITCH_MIN"), ("VT_LND_PTCH_MIN", "VT_LND_PITCH_MIN"),
+        ("ASPD_SC_P_NOISE", "ASPD_SCALE_NSD"), ("ASPD_W_P_NOISE", "ASPD_WIND_NSD"), ("FW_THR_CRUISE", "FW_THR_TRIM"),
+        ("VT_FW_DIFTHR_SC", "VT_FW_DIFTHR_S_Y"), ("LAUN_ALL_ON", "FW_LAUN_DETCN_ON"),
+        ("LAUN_CAT_A", "FW_LAUN_AC_THLD"), ("LAUN_CAT_T", "FW_LAUN_AC_T"), ("LAUN_CAT_MDEL", "FW_LAUN_MOT_DEL"),
+        ("RWTO_L1_PERIOD", "RWTO_NPFG_PERIOD"), ("FW_L1_R_SLEW_MAX", "FW_PN_R_SLEW_MAX"),
+        ("FW_L1_PERIOD", "NPFG_PERIOD"), ("ASPD_FALLBACK_GW", "ASPD_FALLBACK"),
+    )},
+}  # fmt: skip
+"""Old name, new name, and what its value is multiplied by: what the firmware does with a file of an older release
+(param_translation.cpp of 1.11 to 1.18). Those whose values mean something else are left out."""
 _TYPES: Mapping[str, FactType] = {"f": "float", "i": "int", "b": "bool"}
 
 

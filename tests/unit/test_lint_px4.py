@@ -50,6 +50,8 @@ def told(tmp_path: Path, values: dict[str, float], version: str = "1.15.4", targ
         ({"MPC_POS_MODE": 4.5}, "wrong-type", "warning", "whole numbers"),
         ({"MC_ROLRATE_K": 1.0}, "unknown-key", "warning", "Did you mean MC_ROLLRATE_K?"),
         ({"MY_OWN_THING": 1.0}, "unknown-key", "note", "a custom build's"),
+        ({"MPC_XY_VEL_P": 0.09}, "renamed", "warning", "Write MPC_XY_VEL_P_ACC, and its value times 20."),
+        ({"FW_THR_CRUISE": 0.6}, "renamed", "warning", "Write FW_THR_TRIM."),
         ({"SYS_USE_IO": 1.0}, "unknown-key", "warning", "not in PX4 1.15, but in PX4 1.6 to 1.14"),
     ],
 )
@@ -60,7 +62,7 @@ def test_what_the_reference_of_a_release_says_of_a_value(
     assert (problem.rule, problem.severity.value) == (rule, severity)
     assert says in f"{problem.text} {problem.hint}"
     assert problem.parameter in values
-    assert "PX4's parameter reference" in problem.source
+    assert "PX4" in problem.source
 
 
 def test_defaults_calibration_and_what_is_as_documented_raise_nothing(tmp_path: Path) -> None:
@@ -83,6 +85,12 @@ def test_files_of_ardupilot_stay_with_its_own_lists(tmp_path: Path) -> None:
     assert linted.problems == ()
     path.write_text("RC1_MIN,1100\nRC1_MAX,1900\n")
     assert lint([str(path)])[0].problems == (), "both have these names"
+
+
+def test_every_new_name_is_known_where_the_old_one_is_not() -> None:
+    for old, (new, _) in px4.RENAMED.items():
+        assert px4.known_in(old), old
+        assert px4.known_in(new) - px4.known_in(old), new
 
 
 def test_families_and_releases_of_the_table() -> None:
