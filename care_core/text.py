@@ -69,6 +69,11 @@ def number_of(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
+def none_of_logs(count: int) -> str:
+    """The subject of a sentence about logs that all fail: No log, or None of the 3 logs."""
+    return "No log" if count == 1 else f"None of the {count} logs"
+
+
 def listed(names: Sequence[str], last: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`; nothing of none."""
     return f" {last} ".join([", ".join(names[:-1]), *names[-1:]]) if len(names) > 1 else "".join(names)

@@ -12,6 +12,7 @@ from care_core.errors import CareError, ConfigError, LogError
 from care_core.files import read_small_text
 from care_core.profile.site import load_site
 from care_core.records import replace
+from care_core.text import none_of_logs
 
 if TYPE_CHECKING:
     from care_core.diagnose.baseline import Baseline, Proposal, Refused
@@ -95,7 +96,7 @@ def _runs_of(log: Log, profile: Profile) -> tuple[list[Judged], list[Refused]]:
 def _none_read(errors: Sequence[CareError]) -> CareError:
     if len(errors) == 1 or not all(isinstance(err, LogError) for err in errors):
         return next((err for err in errors if not isinstance(err, LogError)), errors[0])
-    return LogError(f"None of the {len(errors)} logs could be read.", hint="Look at one with 'care inspect'.")
+    return LogError(f"{none_of_logs(len(errors))} could be read.", hint="Look at one with 'care inspect'.")
 
 
 _NEW_SITE = "# Limits of this site, read by 'care triage' and the app. Change what you know better.\n"

@@ -11,6 +11,7 @@ from care_core.errors import CareError, LogError, UsageError
 from care_core.files import PROFILE_FILE
 from care_core.profile.store import Profile, available_profiles, load_profile
 from care_core.tables.readiness import RUNS_FILE, Readiness, read_columns, readiness
+from care_core.text import none_of_logs
 
 if TYPE_CHECKING:
     from care_core.profile.schema import Schema
@@ -44,7 +45,7 @@ def new_profile(logs: Sequence[Path], out: Path, *, force: bool, progress: Progr
         except CareError as err:
             failed[str(path)] = err.message
     if not seen:
-        raise LogError(f"None of the {len(logs)} logs could be read.", hint="Look at one with 'care inspect'.")
+        raise LogError(f"{none_of_logs(len(logs))} could be read.", hint="Look at one with 'care inspect'.")
     progress("trying what can be measured", 0.5)
     made = scaffold(seen, out.name, _bundled())
     out.mkdir(parents=True, exist_ok=True)

@@ -31,7 +31,7 @@ from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 from care_core.records import Record, Struct, field
 from care_core.tables.rows import TableRow, rows_of
-from care_core.text import csv_table
+from care_core.text import csv_table, none_of_logs
 
 Report = Callable[[str, float], None]
 
@@ -210,7 +210,7 @@ def schema_that_fits(paths: Sequence[Path], *, limit_s: float = 600.0) -> Schema
             if not isinstance(answer, Failed):
                 return load_profile(answer).schema
     raise LogError(
-        f"None of the {len(paths)} logs fits an installed profile.",
+        f"{none_of_logs(len(paths))} fits an installed profile.",
         hint="Look at one with 'care inspect', or name the profile with --profile.",
     )
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.errors import ExitCode, LogError
-from care_core.text import number_of
+from care_core.text import none_of_logs, number_of
 from care_tui.commands.arguments import AsJson, Force, LogPath, Out, ProfileName
 from care_tui.console import Progress, check_writable, emit, say
 
@@ -110,7 +110,7 @@ def ingest(
         emit(ingesting.failures_table(found.failures), failures, hint=REMOVE_HINT)
     if not found.rows:
         journal.unlink(missing_ok=True)
-        raise LogError(f"None of the {len(paths)} logs could be read.", hint="Look at one with 'care inspect'.")
+        raise LogError(f"{none_of_logs(len(paths))} could be read.", hint="Look at one with 'care inspect'.")
     write_table(out, found.rows, schema)
     journal.unlink(missing_ok=True)
     runs, failed = number_of(len(found.rows), "run"), number_of(len(found.failures), "log")

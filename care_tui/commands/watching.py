@@ -80,6 +80,10 @@ def watch(
     missing += [folder for folder in folders if once and not folder.exists()]
     if missing:
         raise UsageError("There is no such folder.", hint="Name the folder that logs come to.", where=str(missing[0]))
+    closed = [folder for folder in folders if folder.exists() and not os.access(folder, os.R_OK | os.X_OK)]
+    if closed:
+        hint = "Check its owner and mode."
+        raise UsageError("No permission to read the folder.", hint=hint, where=str(closed[0]))
     notifier = None if notify_command is None else parse_notifier(notify_command)
     path = None if no_history else history_path()
     if profile is not None:

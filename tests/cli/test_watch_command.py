@@ -124,3 +124,14 @@ def test_lines_wait_while_the_app_is_open(monkeypatch: pytest.MonkeyPatch, capsy
     assert capsys.readouterr().out == ""
     screen._await_app(1.0)
     assert "a.BIN" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", [[], ["--once"]])
+def test_a_folder_that_may_not_be_entered_is_said_to_be(
+    care: Care, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
+) -> None:
+    may = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode, **more: Path(path) != tmp_path and may(path, mode, **more))
+    outcome = care("watch", tmp_path, *words, "--no-history")
+    assert outcome.code == 2
+    assert f"{tmp_path}: No permission to read the folder. Check its owner and mode." in outcome.stderr
