@@ -12,7 +12,7 @@ from care_core.records import replace
 from care_core.text import number_of, seconds
 from care_tui.messages import Judge
 from care_tui.pages.page import Page, View, enter_to, sentence
-from care_tui.render.objectives import objective_item
+from care_tui.render.objectives import STATUS_WIDTH, objective_item
 from care_tui.render.rows import Row, Rows, status, text, warning
 from care_tui.widgets.choices import Listing
 
@@ -59,7 +59,7 @@ class MissionsPage(Page):
             return Rows([])
         verdict = self._diagnosis.missions[index]
         rows = [
-            Row(objective_item(result, NAME_WIDTH, self.glyphs, self.reader.room.width), 2)
+            Row(objective_item(result, NAME_WIDTH, self.glyphs, self.reader.room.width), STATUS_WIDTH)
             for result in verdict.results
         ]
         cut = warning("Mission", "the log stops before the mission does")
