@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import UsageError, nearest
-from care_core.lint import contradictions, lists, plugins, workable
+from care_core.lint import contradictions, foreign, lists, plugins, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED, Renamed
@@ -58,7 +58,7 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     told = frozenset({distribution} if distribution else ())
     shown = told or (plugins.shown(file) if result.ros == "ros2" else told)
     likely = told or _likely(result, shown)
-    raised = list(lists.raised(file, result, shown)) if result.ros == "ros2" else []
+    raised = [*(lists.raised(file, result, shown) if result.ros == "ros2" else ()), *foreign.foreign(file, result)]
     told_as_one = [place.entry for one in raised for place in one.places]
     yield from (one.problem for one in raised)
     for place in result.places:

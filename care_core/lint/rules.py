@@ -16,7 +16,7 @@ class Rule(NamedTuple):
 _TABLES = "the sources of each release, as tables"
 RULES: tuple[Rule, ...] = (
     Rule("syntax", "A line that the reader of the format refuses.", "the format: YAML, NAME VALUE, or five columns"),
-    Rule("no-parameters", "A file of something else that names nodes of Nav2.", "ROS 2 reads below ros__parameters"),
+    Rule("no-parameters", "Values of Nav2's nodes where ROS 2 reads none.", "ROS 2 reads below ros__parameters"),
     Rule("duplicate", "The same parameter twice in one file.", "how the readers of the format work"),
     Rule("unknown-key", "A name that nothing reads in any release.", _TABLES),
     Rule("misplaced-key", "A name that is read elsewhere, but not at that place.", _TABLES),
@@ -167,6 +167,11 @@ MEANT: dict[tuple[str, str], str] = {
     ("planner_server", "plugins"): "planner_plugins",
     ("behavior_server", "plugins"): "behavior_plugins",
     ("smoother_server", "plugins"): "smoother_plugins",
+    ("amcl", "initial_pose_x"): "initial_pose.x",
+    ("amcl", "initial_pose_y"): "initial_pose.y",
+    ("amcl", "initial_pose_a"): "initial_pose.yaw",
+    ("DWBLocalPlanner", "max_speed_theta"): "max_vel_theta",
+    ("GracefulController", "initial_rotation_threshold"): "initial_rotation_tolerance",
     ("velocity_smoother", "max_vel"): "max_velocity",
     ("velocity_smoother", "min_vel"): "min_velocity",
 }

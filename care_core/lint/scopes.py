@@ -23,6 +23,7 @@ _LAYERS_BY_NAME = {
     "obstacle_layer": ("ObstacleLayer", "VoxelLayer"),
 }  # fmt: skip
 """Names that the costmap itself gives layers (costmap_2d_ros.cpp, loadOldParameters)."""
+_CLASS = re.compile(r"[A-Z]\w*(?:ROS|Planner|Controller)")
 _NODES = frozenset({COSTMAP, "move_base", "amcl", "map_server"})
 _OPEN = frozenset({"bt_navigator"})
 """Nodes that let any plugin of theirs read parameters."""
@@ -221,7 +222,8 @@ def _ros1(file: ConfigFile) -> Scoped:
     everywhere = set(parts) | {key[:depth] for key in parts for depth in range(len(key))} | set(result.plugins)
     owners: dict[Keys, Keys] = {}
     for keys in sorted(everywhere, key=len):
-        owners[keys] = _reader(file, keys, owners, parts, result.plugins)
+        is_foreign = any(_is_foreign(key) for key in keys)
+        owners[keys] = () if is_foreign else _reader(file, keys, owners, parts, result.plugins)
     for keys, entries in parts.items():
         for entry in entries:
             result.places.append(_ros1_place(entry, keys, owners, values))
@@ -263,8 +265,23 @@ def _reader(
         return (COSTMAP,)
     below = {key[len(keys)] for key in parts if len(key) > len(keys) and key[: len(keys)] == keys}
     if not keys and below & {"DWAPlannerROS", "TrajectoryPlannerROS", "TebLocalPlannerROS", *_COSTMAPS}:
-        return ("move_base",)
+        return _of_part([entry.keys[-1] for entry in parts.get(keys, ())]) or ("move_base",)
     return _by_names([entry.keys[-1] for entry in parts.get(keys, ())], is_inside=bool(keys))
+
+
+def _is_foreign(name: str) -> bool:
+    """Whether it is a planner or controller that no table knows, by how their classes are named: what stands below is
+    its own, whoever has parameters of the same names."""
+    return bool(_CLASS.fullmatch(name)) and name not in navigation.owners("ros1")
+
+
+def _of_part(names: Sequence[str]) -> Keys:
+    """The plugin whose file it is, loaded into its namespace by a launch: it knows all of these names, and move_base
+    none."""
+    if any(navigation.known("ros1", "move_base", name) for name in names):
+        return ()
+    found = _by_names(names, is_inside=True)
+    return found if all(navigation.known("ros1", owner, name) for owner in found for name in names) else ()
 
 
 def _by_names(names: Sequence[str], *, is_inside: bool) -> Keys:

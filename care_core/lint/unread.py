@@ -11,7 +11,7 @@ from difflib import SequenceMatcher
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Problem, Severity
 from care_core.lint.rules import LEFTOVERS, MEANT, PAIRED, PAIRED_SOURCE, Leftover, Paired
-from care_core.lint.scopes import Keys, Place, Scoped, class_of, split, words_of
+from care_core.lint.scopes import COSTMAP, Keys, Place, Scoped, class_of, split, words_of
 from care_core.metadata import navigation
 from care_core.metadata.navigation import DISTRIBUTIONS, STACKS
 
@@ -21,6 +21,7 @@ _FEW = 3
 """A name that more plugins beside each other read is one that any has, and tells none of them."""
 _CLEAR = 2
 """Most readers of another node by which a name is known to be theirs."""
+_LAYERS = frozenset({"StaticLayer", "ObstacleLayer", "VoxelLayer", "InflationLayer"})
 _SEARCHED = frozenset({
     "obstacle_range", "raytrace_range", "controller_frequency", "footprint", "robot_radius", "footprint_topic",
     "published_footprint_topic",
@@ -140,6 +141,8 @@ def _differs(name: str, other: str, words: Iterable[str]) -> bool:
 def _others(result: Scoped, place: Place, likely: frozenset[str]) -> list[str]:
     """Who else reads a name: those of the file's distributions, else those of any."""
     found = [one for one in navigation.readers(result.ros, place.name) if one not in place.owners]
+    if result.ros == "ros1" and COSTMAP in found and set(place.owners) & _LAYERS and len(found) > 1:
+        found.remove(COSTMAP)  # once layers have parts of their own, nothing hands its own values on to them
     return [one for one in found if _is_read(result, one, place.name, likely)] or found
 
 

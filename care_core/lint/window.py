@@ -45,8 +45,14 @@ def window(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                     f"{side.keys[-1]} of the local costmap ({side.number:g} m) ends before {reach.what} "
                     f"({reach.far_m:.3g} m)."
                 )
-                hint = f"Make it more than {2 * reach.far_m:.3g} m."
+                hint = f"Make it more than {2 * reach.far_m:.3g} m{_or_less(reach)}."
                 yield warning("hinders", file, side, text, hint, reach.source, reach.others)
+
+
+def _or_less(reach: Reach) -> str:
+    """The other way, by what is set in time or distance: a large costmap costs much on each update."""
+    names = [one.keys[-1] for one in reach.others if one.keys[-1] in ("sim_time", "time_steps", "lookahead_dist")]
+    return f", or {names[0]} less" if names else ""
 
 
 def _reaches(held: Readers, costmap: Reader) -> Iterator[Reach]:
