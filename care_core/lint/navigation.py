@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import UsageError, nearest
-from care_core.lint import contradictions, foreign, lists, plugins, workable
+from care_core.lint import choices, contradictions, foreign, lists, parsed, plugins, refused, sources, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED, Renamed
@@ -71,10 +71,14 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         text = f"Nothing loads {name}: no list of {key} names it."
         yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
     if result.ros == "ros2":
+        yield from parsed.check(file)
         yield from _misnested(file, result)
         yield from _nodes(file, shown, is_told=bool(told))
         yield from plugins.check(file, distribution)
         yield from lists.classless(file, result, shown)
+    yield from choices.check(file, result, likely)
+    yield from sources.check(file, result, likely)
+    yield from refused.check(file, result, likely)
     yield from _unused(file, result)
     yield from values(file, result)
 

@@ -38,10 +38,13 @@ def _smoothed(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     for reader in held.of("velocity_smoother"):
         for name in ("max_velocity", "max_accel"):
             entry = reader.values.get(name)
-            first = numbers(entry)[:1]
-            if entry is not None and first and first[0] == 0:
-                text = f"{name} of velocity_smoother begins with 0: the robot never moves."
-                yield warning("cannot-work", file, entry, text, "It must be above 0.", "velocity_smoother.cpp")
+            own = numbers(entry)
+            if entry is None or len(own) not in _LENGTHS:
+                continue
+            for number, where, does in ((own[0], "begins", "moves"), (own[-1], "ends", "turns")):
+                if number == 0:
+                    text = f"{name} of velocity_smoother {where} with 0: the robot never {does}."
+                    yield warning("cannot-work", file, entry, text, "It must be above 0.", "velocity_smoother.cpp")
         entry = reader.values.get("deadband_velocity")
         first = numbers(entry)[:1]
         if entry is not None and top is not None and top.number and first and first[0] >= top.number > 0:

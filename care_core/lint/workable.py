@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from itertools import combinations
 from typing import NamedTuple
 
-from care_core.lint import layers, smoother, window
+from care_core.lint import critics, frames, layers, monitor, refused, smoother, sources, window
 from care_core.lint.contradictions import inscribed_radius
 from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.lint.readers import (
@@ -113,6 +113,8 @@ ABOVE: tuple[Above, ...] = (
           "obstacle_layer.cpp, updateBounds"),
     Above(("StaticLayer", COSTMAP), ("lethal_cost_threshold",), "every cell of the map is an obstacle",
           "static_layer.cpp, interpretValue"),
+    Above((COSTMAP,), ("robot_radius",), "the robot has no size, and plans touch obstacles",
+          "costmap_2d_ros.cpp draws a circle of it where no footprint is set", rule="hinders"),
     Above(INFLATIONS, ("inflation_radius",), "plans may touch obstacles", "inflation_layer.cpp", rule="contradiction"),
 )  # fmt: skip
 
@@ -155,6 +157,8 @@ def _above(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
             continue
         for key, entry in reader.values.items():
             if key.rpartition(".")[2] not in rule.names or entry.number is None or _is_of_source(key):
+                continue
+            if key == "robot_radius" and reader.has_footprint():
                 continue
             if entry.number * rule.sign < 0 or (entry.number == 0 and not rule.zero):
                 text = f"{entry.keys[-1]} is {entry.number:g}: {rule.why}."
@@ -386,5 +390,6 @@ def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
 
 RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
     _simulated, _predicted, _considered, _settles, _starts, _progress, window.window, _cells, _sizes, *layers.RULES,
-    _goal_checks, _unknown_space, _drawn, *smoother.RULES, _clocks,
+    _goal_checks, _unknown_space, _drawn, *smoother.RULES, *monitor.RULES, *critics.RULES, *frames.RULES,
+    *sources.RULES, *refused.RULES, _clocks,
 )  # fmt: skip

@@ -701,8 +701,8 @@ def test_a_value_is_judged_only_where_the_release_reads_it(
         (MPPI, ("critics: [GoalCritic, CostCritic]", "CostCritic: {enabled: true}"), ""),
         (MPPI, ("critics: [GoalCritic, MyOwnCritic]",), ""),
         (DWB, ("critics: [RotateToGoal, PathDist, GoalDist]",), "critics"),
-        (DWB, ("critics: [RotateToGoal, ObstacleFootprintCritic]",), ""),
-        (DWB, ("critics: [RotateToGoal, BaseObstacle]", "BaseObstacle.scale: 0.0"), "BaseObstacle.scale"),
+        (DWB, ("critics: [PathDist, ObstacleFootprintCritic]",), ""),
+        (DWB, ("critics: [PathDist, BaseObstacle]", "BaseObstacle.scale: 0.0"), "BaseObstacle.scale"),
         (DWB, ("critics: [RotateToGoal, my_critics::Walls]",), ""),
         (DWB, ("critics: [RotateToGoal, Walls]", "Walls: {class: BaseObstacle}"), ""),
     ],
@@ -721,7 +721,7 @@ def test_a_controller_none_of_whose_critics_looks_at_obstacles(
         (DWB, ("critics: [PathAlign, BaseObstacle]", "PathAlignCritic: {scale: 32.0}"),
          [("misplaced-key", "Name the part PathAlign, as the list does.")]),
         (DWB, ("critics: [PathAlignCritic, BaseObstacle]", "PathAlignCritic.scale: 32.0"), []),
-        (DWB, ("critics: [BaseObstacle]", "GoalDist.scale: 24.0", "GoalDist.aggregation_type: last"),
+        (DWB, ("critics: [BaseObstacle, PathDist]", "GoalDist.scale: 24.0", "GoalDist.aggregation_type: last"),
          [("not-loaded", "Add it to critics, or leave it out.")]),
         (DWB, ("critics: [BaseObstacle, Ahead]", "Ahead: {class: GoalDist, scale: 24.0}"), []),
         (DWB, ("GoalDist.scale: 24.0",), []),
@@ -779,7 +779,8 @@ def test_a_source_by_another_name_than_the_part_that_describes_it(tmp_path: Path
     parts = ["scan"] if " " not in sources else sources.split()
     layer = ("plugins: [obstacles]", "obstacles:", "  plugin: nav2_costmap_2d::ObstacleLayer",
              f"  observation_sources: {sources}",
-             *(f"  {one}: {{topic: /{one}, marking: true, clearing: true}}" for one in parts))  # fmt: skip
+             *(f"  {one}: {{topic: /{one}, marking: true, clearing: true, max_obstacle_height: 2.0}}"
+               for one in parts))  # fmt: skip
     found = [(one.rule, one.hint) for one in findings(tmp_path, costmap(*layer))]
     assert found == ([("contradiction", "Give both the same name: filtered or scan.")] if wrong else [])
 
