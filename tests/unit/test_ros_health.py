@@ -587,6 +587,27 @@ def test_speeds_that_no_position_gives_are_told(tmp_path: Path) -> None:
     assert finding.evidence.startswith("4 of 200 messages: up to 37.0 m/s, its positions give 0.5 m/s at most, up to")
 
 
+def in_turn(odometry: Any, time_s: float) -> None:
+    """Each second message is another's, which starts somewhere else."""
+    odometry.pose.pose.position.y += 0.2 if round(time_s / 0.2) % 2 else 0.0
+
+
+def test_odometry_of_two_publishers_is_told_and_not_added_up(tmp_path: Path) -> None:
+    health = looked_at(changed(ODOMETRY, in_turn), tmp_path)
+    (finding,) = health.findings
+    assert (finding.title, finding.suspect) == ("two sources publish /wheels/odom in turn", "operation")
+    assert "its odometry comes from two sources: how far it went is not known" in [one.text for one in health.timeline]
+
+
+def test_the_largest_jump_is_named(tmp_path: Path) -> None:
+    def twice(odometry: Any, time_s: float) -> None:
+        odometry.pose.pose.position.y += 1.0 * (time_s > 15.0) + 6.0 * (time_s > 25.0)
+
+    (finding,) = looked_at(changed(ODOMETRY, twice), tmp_path).findings
+    assert finding.title == "odometry jumps by up to 6 m"
+    assert finding.evidence.startswith("first 1.0")
+
+
 class Silenced(Drive):
     """Of which topics end, or pause, in a time: (topic's type, from, to)."""
 
@@ -603,6 +624,18 @@ def test_a_robot_that_drives_on_after_its_last_command_is_told(last_s: float, to
     findings = looked_at(Silenced(silent=((TWIST, last_s, 99.0),)), tmp_path).findings
     assert [one.title for one in findings] == told
     assert all("it goes on for 10.0 s and 5.0 m, to the end of the recording" in one.evidence for one in findings)
+
+
+def test_a_robot_that_is_commanded_once_and_waits_drives_on_in_its_rhythm(tmp_path: Path) -> None:
+    """Each pause of its commands is as long as the one in which the recording ends."""
+
+    class Seldom(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                if name != TWIST or time_s % 4.0 < 0.05:
+                    yield topic, name, time_s, message
+
+    assert [one.title for one in looked_at(Seldom(), tmp_path).findings] == []
 
 
 def test_a_robot_that_stops_after_its_last_command_is_fine(tmp_path: Path) -> None:

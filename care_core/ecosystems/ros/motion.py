@@ -36,6 +36,9 @@ _WAY_M, _STOOD = 1.0, 0.05
 _ENOUGH = 20
 """Samples that must agree before odometry is called dead."""
 _NEARLY_ALL, _A_SECOND = 0.99, 1.0
+IN_TURN_M, IN_TURN, BACK = 0.02, 0.25, 0.3
+"""Two steps in a row that go so much beyond what its speed explains, and together do not, but for this share of them:
+where so many of its samples are such, two publishers send in turn. Noise at rest is a tenth of that step."""
 _FEWEST = 3
 """Samples without which there is no movement to speak of."""
 
@@ -99,6 +102,23 @@ class Odometry(Record, eq=False):
         if self.stands_still or not len(rows):
             return spoken
         return min(spoken, quantile(self._rate(rows, later, self.x, self.y), _NEARLY_ALL))
+
+    @property
+    def in_turn(self) -> NDArray[np.intp]:
+        """The samples that are elsewhere than those before and after them: none, unless they are many."""
+        went, most = self.steps_m
+        first, second = (went - most)[1:-1], (went - most)[2:]
+        along = np.hypot(self.x[2:] - self.x[:-2], self.y[2:] - self.y[:-2]) - most[1:-1] - most[2:]
+        least = np.minimum(first, second)
+        rows: NDArray[np.intp] = np.flatnonzero((least > IN_TURN_M) & (along < BACK * least)) + 1
+        return rows if len(rows) >= max(_ENOUGH, IN_TURN * len(self.t)) else rows[:0]
+
+    @property
+    def steps_m(self) -> tuple[Floats, Floats]:
+        """Per sample how far the position went since the one before, and the most that the speeds allow, m."""
+        went = np.hypot(np.diff(self.x, prepend=self.x[:1]), np.diff(self.y, prepend=self.y[:1]))
+        speed = np.hypot(self.speed, self.sideways)
+        return went, np.maximum(speed, np.concatenate([speed[:1], speed[:-1]])) * self.dt
 
     @property
     def moves(self) -> Bools:

@@ -267,6 +267,8 @@ def _motion(drive: Drive) -> Iterator[Event]:
 
 def _driven(odometry: Odometry) -> str:
     """How far and how fast it went; positions alone, such as a receiver's, wander too much to be added up."""
+    if len(odometry.in_turn):
+        return "its odometry comes from two sources: how far it went is not known"
     if not odometry.tells_speed:
         return f"its positions lie within {odometry.spread_m(0.0):.1f} m; its odometry tells no speed"
     went = odometry.way_by_speed_m if odometry.stands_still else odometry.path_m()

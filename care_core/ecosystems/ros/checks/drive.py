@@ -18,6 +18,7 @@ from care_core.ecosystems.ros.motion import (
     BREAKS_LOOSE_MPS,
     BREAKS_LOOSE_RADPS,
     STALE_S,
+    Commands,
     Following,
     Odometry,
 )
@@ -54,6 +55,7 @@ RESTS_M = LIMITS.add("way in a standstill", 0.03, "m", "it stops and starts in i
 REPEATED = int(LIMITS.add("samples of a standstill of odometry alone", 4, "", "drivers repeat a pose 2 to 4 times"))
 KEEPS_UP = LIMITS.add("share of its speed that a robot keeps over a second", 0.7, "", "a stop of 0.3 s costs as much")
 GOES_ON_S = LIMITS.add("time that it drives on", 1.5, "s", "drivers stop after 0.5 s, and it takes a second to stand")
+RHYTHM = LIMITS.add("pauses as long that came before", 2, "", "one may be an outage; two are how it is commanded")
 GOES_ON = LIMITS.add("share of its speed that it keeps", 0.6, "", "less is coming to a stop")
 LOST_S = LIMITS.add("pause between samples", 3.0, "s", "over a longer one nobody knows whether the robot stood")
 STRAIGHT_RADPS = LIMITS.add("turn of a command to go straight on", 0.5, "rad/s", "it takes a wheel 0.1 m/s at most")
@@ -170,6 +172,8 @@ def _uncommanded(drive: Drive) -> Iterator[Finding]:
     if not count or later.clock[count - 1] - later.clock[0] < GOES_ON_S - STALE_S:
         return
     end_s = float(later.t[count - 1])
+    if _is_its_rhythm(commands, end_s - last_s):
+        return
     went_m, turned = odometry.path_m(last_s, end_s), float(np.ptp(np.unwrap(later.yaw[:count])))
     way = f"{went_m:.1f} m" if abs(commands.speed[-1]) >= BREAKS_LOOSE_MPS else f"{np.degrees(turned):.0f} deg of turn"
     until = "to the end of the recording" if count == len(later.t) else f"until {log_time(end_s)}"
@@ -185,6 +189,14 @@ def _uncommanded(drive: Drive) -> Iterator[Finding]:
         suspect="operation",
         probability=0.7,
     )
+
+
+def _is_its_rhythm(commands: Commands, silent_s: float) -> bool:
+    """Whether pauses as long came before, too, each after a command to move: a program that commands once and waits,
+    of which the recording ends before the next one."""
+    moves = (np.abs(commands.speed) >= BREAKS_LOOSE_MPS) | (np.abs(commands.turn) >= BREAKS_LOOSE_RADPS)
+    pauses = np.diff(commands.t)[moves[:-1]]
+    return bool(np.count_nonzero(pauses >= silent_s) >= RHYTHM)
 
 
 def _goes_on(later: Odometry, odometry: Odometry, speed: float, turn: float) -> int:

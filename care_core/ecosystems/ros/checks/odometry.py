@@ -15,6 +15,7 @@ from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros.checks.drive import standstills
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive, way_through
 from care_core.ecosystems.ros.messages import COMMANDS, GOALS, MESSAGES, ODOMETRY, TF, holds, reading
+from care_core.ecosystems.ros.motion import IN_TURN_M as TURN_M
 from care_core.ecosystems.ros.motion import STALE_S, Odometry, never_moved
 from care_core.logs.base import Table
 from care_core.numbers import Floats, median, quantile
@@ -50,6 +51,7 @@ IN_TURN = LIMITS.add(
     "share of the steps that are such", 0.25, "", "two sources of unlike rates send half or fewer in turn"
 )
 BACK = LIMITS.add("how near it is to where it was, in steps", 0.3, "", "while the robot moves, both change a little")
+LIMITS.add("step of odometry there and back", TURN_M, "m", "noise at rest is a tenth of it")
 PLACES = LIMITS.add("transforms of map -> odom", 3, "", "fewer show no step")
 FOUND_S = LIMITS.add("time to find the robot on the map", 5.0, "s", "the first corrections are large")
 PUSHED_S = LIMITS.add("time after a contact that is not compared", 10.0, "s", "a choice: it pushes, or backs off")
@@ -59,12 +61,14 @@ PAUSE_S = LIMITS.add("pause between samples", STALE_S, "s", "over a longer one t
 
 
 def find(drive: Drive) -> Iterator[Finding]:
-    """Odometry that cannot be, that jumps or drifts, and a localisation that jumps."""
+    """Odometry that cannot be, that jumps, drifts or comes from two publishers, and a localisation that jumps."""
     odometry = drive.odometry
     yield from _unusable(drive)
     if odometry is not None and not odometry.stands_still:
         yield from _impossible(drive, odometry)
-    if odometry is not None and odometry.tells_speed and not odometry.stands_still:
+    if odometry is not None and len(odometry.in_turn):
+        yield _two_publishers(drive, odometry)
+    elif odometry is not None and odometry.tells_speed and not odometry.stands_still:
         yield from _jumps(drive, odometry)
         yield from _drift(drive, odometry)
     yield from _corrections(drive)
@@ -156,10 +160,9 @@ def _is_nothing(table: Table) -> bool:
 
 def _steps(odometry: Odometry) -> tuple[Floats, Floats, Floats]:
     """Per sample how far the position went since the one before, and the least and most that the speeds allow, m."""
-    went = np.hypot(np.diff(odometry.x, prepend=odometry.x[:1]), np.diff(odometry.y, prepend=odometry.y[:1]))
-    speed, dt = np.hypot(odometry.speed, odometry.sideways), odometry.dt
-    before = np.concatenate([speed[:1], speed[:-1]])
-    return went, np.minimum(speed, before) * dt, np.maximum(speed, before) * dt
+    went, most = odometry.steps_m
+    speed = np.hypot(odometry.speed, odometry.sideways)
+    return went, np.minimum(speed, np.concatenate([speed[:1], speed[:-1]])) * odometry.dt, most
 
 
 def _jumps(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
@@ -170,15 +173,16 @@ def _jumps(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
     rows = np.flatnonzero(excess > np.where(most > 0.0, JUMP_M, JUMP_AT_REST_M))
     if not len(rows):
         return
-    at, far = float(odometry.t[rows[0]]), float(went[rows[0]])
-    more = f"; {len(rows)} such jumps" if len(rows) > 1 else ""
+    at, far, largest = float(odometry.t[rows[0]]), float(went[rows[0]]), float(went[rows].max())
+    words, more = f"{far:.2f} m", f"; {len(rows)} such jumps" if len(rows) > 1 else ""
+    words = f"first {words}" if largest > far else words
     yield Finding(
         kind="localisation",
-        title=f"odometry jumps by {far:.2g} m",
+        title=f"odometry jumps by {'up to ' * (largest > far)}{largest:.2g} m",
         onset_s=at,
         end_s=float(odometry.t[rows[-1]]),
         severity=drive.severity(at),
-        evidence=f"{far:.2f} m within {dt[rows[0]]:.2f} s, its speed explains {most[rows[0]]:.2f} m{more}",
+        evidence=f"{words} within {dt[rows[0]]:.2f} s, its speed explains {most[rows[0]]:.2f} m{more}",
         source=f"{odometry.topic}: position against its own speed",
         probability=0.9,
     )
@@ -287,6 +291,23 @@ def _in_turn(x: Floats, y: Floats, steps: Floats) -> NDArray[np.intp] | None:
     return turns if len(turns) >= IN_TURN * len(steps) and len(turns) > PLACES else None
 
 
+def _two_publishers(drive: Drive, odometry: Odometry) -> Finding:
+    """A driver and a filter, or two robots of one network: who listens takes the robot to leap at each message."""
+    rows = odometry.in_turn
+    at, far = float(odometry.t[rows[0]]), float(median(odometry.steps_m[0][rows]))
+    return Finding(
+        kind="localisation",
+        title=f"two sources publish {odometry.topic} in turn",
+        onset_s=at,
+        end_s=float(odometry.t[rows[-1]]),
+        severity=drive.severity(at),
+        evidence=f"{len(rows)} of {len(odometry.t)} messages step by {far:.2g} m beyond its speed, the next goes back",
+        source=odometry.topic,
+        suspect="operation",
+        probability=0.9,
+    )
+
+
 def _two_sources(drive: Drive, topic: str, t: Floats, turns: NDArray[np.intp]) -> Finding:
     return Finding(
         kind="localisation",
@@ -321,7 +342,7 @@ def _is_number(*values: object) -> bool:
 READS = reading(ODOMETRY, *TF, *COMMANDS, *GOALS)
 CHECK = Check(
     "odometry",
-    "odometry without numbers, that jumps or drifts, a localisation that jumps or has two sources",
+    "odometry without numbers, that jumps, drifts or has two sources, and the same of a localisation",
     READS,
     LIMITS,
     find,
