@@ -16,7 +16,7 @@ from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Severity
 from care_core.ecosystems.liveness import Frozen, is_part
 from care_core.ecosystems.plausible import STAMP
-from care_core.ecosystems.ros import sources
+from care_core.ecosystems.ros import bumpers, sources
 from care_core.ecosystems.ros.falls import Fall, fall_of
 from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, actionlib_goals, nav2_goals
 from care_core.ecosystems.ros.messages import (
@@ -172,7 +172,7 @@ class Drive(RunModel):
 
     def look_at(self, types: Iterable[str]) -> None:
         """Read samples of messages of these types, in one pass with whatever else is expected to be read."""
-        self._looked_at = topics(self.channels, types)
+        self._looked_at = {**topics(self.channels, types), **dict.fromkeys(self.bumper_topics, bumpers.FIELDS)}
         lacking = {name: fields for name, fields in self._expected.items() if self._lacks({name: fields})}
         self._tables |= self.decode(lacking)
         self._read = self._expected
@@ -183,7 +183,8 @@ class Drive(RunModel):
         sampled, self._looked_at = self._looked_at, {}
         if not sampled:
             return super().decode(wanted)
-        most = {one.name: MESSAGES[type_of(one)].at_most for one in self.channels if one.name in sampled}
+        known = {one.name: MESSAGES.get(type_of(one)) for one in self.channels if one.name in sampled}
+        most = {name: 0 if one is None else one.at_most for name, one in known.items()}
         thinned = {name: count for name, count in most.items() if count and name not in wanted}
         tables = self.log.read(merge_needs((wanted, sampled)), thinned)
         for name in sampled.keys() & tables.keys():
@@ -342,6 +343,17 @@ class Drive(RunModel):
         return math.nan if self.odometry is None else self.odometry.path_m(start_s, end_s)
 
     @cached_property
+    def bumper_topics(self) -> tuple[str, ...]:
+        """Topics of bumpers, by their type and, where that may be of anything, by their name."""
+        return tuple(one.name for one in self.channels if one.count and bumpers.is_bumper(one))
+
+    @cached_property
+    def bumps(self) -> tuple[tuple[float, float], ...]:
+        """From when to when a bumper was pressed, by what its messages say."""
+        tables = [self._samples[name] for name in self.bumper_topics if name in self._samples]
+        return tuple(sorted(span for table in tables for span in bumpers.contacts(table, self.duration_s)))
+
+    @cached_property
     def contact_topics(self) -> tuple[str, ...]:
         """Topics by whose names something touched the robot when they speak, which they do at times."""
         return tuple(
@@ -351,12 +363,14 @@ class Drive(RunModel):
             and not _NO_CONTACT.search(one.name)
             and 0 < one.count <= MOST_CONTACTS
             and one.name not in self.streams
+            and one.name not in self.bumper_topics
         )
 
     @cached_property
     def contacts_s(self) -> Floats:
-        """When something touched the robot, by topics that speak only then."""
+        """When something touched the robot, by topics that speak only then and by its bumpers."""
         told = [self.times[name][self.times[name] > LATCHED_S] for name in self.contact_topics]
+        told.append(np.array([start for start, _ in self.bumps if start > LATCHED_S]))
         every = np.sort(np.concatenate([np.empty(0), *told]))
         return every[np.diff(every, prepend=-np.inf) > SAME_CONTACT_S]
 

@@ -212,8 +212,9 @@ def _contacts(drive: Drive) -> Iterator[Event]:
     times = drive.contacts_s.tolist()
     if times:
         when = _listed((log_time(at) for at in times), _CONTACTS)
-        words = f"{counted(len(times), 'contact')} told by {_listed(drive.contact_topics)}: {when}"
-        yield Event(times[0], "contact", words, drive.contact_topics[0])
+        topics = (*drive.contact_topics, *(drive.bumper_topics if drive.bumps else ()))
+        words = f"{counted(len(times), 'contact')} told by {_listed(topics)}: {when}"
+        yield Event(times[0], "contact", words, topics[0])
 
 
 def _lifecycle(drive: Drive) -> Iterator[Event]:

@@ -10,6 +10,7 @@ from care_core.ecosystems.base import Check
 from care_core.ecosystems.ros.checks import (
     battery,
     blocked,
+    contacts,
     drive,
     falls,
     imu,
@@ -32,6 +33,7 @@ CHECKS: tuple[Check[Drive], ...] = (
     recorded.CHECK,
     drive.CHECK,
     blocked.CHECK,
+    contacts.CHECK,
     imu.CHECK,
     topics.CHECK,
     planner.CHECK,
