@@ -608,6 +608,17 @@ def test_the_largest_jump_is_named(tmp_path: Path) -> None:
     assert finding.evidence.startswith("first 1.0")
 
 
+@pytest.mark.parametrize(("until_s", "titles"), [(24.0, ["/front/scan comes up to 4.0 s late, in bursts"]), (21.0, [])])
+def test_a_sensor_whose_messages_are_held_back_is_late(until_s: float, titles: list[str], tmp_path: Path) -> None:
+    class HeldBack(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                is_held = name == SCAN and 20.0 <= time_s < until_s
+                yield topic, name, until_s + time_s / 1000 if is_held else time_s, message
+
+    assert [one.title for one in looked_at(HeldBack(), tmp_path).findings] == titles
+
+
 class Silenced(Drive):
     """Of which topics end, or pause, in a time: (topic's type, from, to)."""
 

@@ -71,6 +71,12 @@ def find(drive: Drive) -> Iterator[Finding]:
     yield from _renamed(drive)
 
 
+def stalls(drive: Drive) -> bool:
+    """Whether several topics, or all, paused at once."""
+    silence = _silence(drive)
+    return bool(silence) or any(True for _ in _outage(drive, silence))
+
+
 def _qos(drive: Drive) -> Iterator[Finding]:
     counts = {channel.name: channel.count for channel in drive.channels}
     complaints: dict[str, tuple[float, str, str]] = {}
