@@ -15,7 +15,8 @@ from care_core.ecosystems.findings import Health
 from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros import ECOSYSTEM
 from care_core.ecosystems.ros.checks import odometry
-from care_core.ecosystems.ros.checks.messages import gist
+from care_core.ecosystems.ros.checks.messages import gist, reported
+from care_core.ecosystems.ros.node_messages import Report
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SCAN, SUCCEEDED, TWIST, Drive
@@ -121,7 +122,7 @@ def test_the_gist_of_a_traceback_is_what_was_raised_and_where() -> None:
         "ValueError: cannot convert float NaN to integer\n"
     )
     assert gist(text) == "ValueError: cannot convert float NaN to integer (pursuit.py line 176, on_fix)"
-    assert gist("laser is gone " * 20) == ("laser is gone " * 20)[:80]
+    assert gist("laser is gone " * 20) == f"{'laser is gone ' * 5}laser..."
 
 
 @pytest.mark.parametrize("outcome", [SUCCEEDED, ABORTED])
@@ -334,6 +335,13 @@ def test_a_transform_whose_fields_are_declared_as_what_they_are_not_says_nothing
     assert len(odometry._map_to_odom(t, *columns(good, good | wrong))) == 1
     scalars = [np.array([7, 7], dtype=object)] * 4
     assert len(odometry._map_to_odom(t, *scalars)) == 0
+
+
+def test_what_is_never_published_is_told_in_words() -> None:
+    silent = Report(1.0, "/diagnostics", "ekf_node: odometry/filtered topic status", 2, "No events recorded.")
+    assert reported(silent) == "diagnostics: ekf_node publishes nothing on odometry/filtered"
+    slow = Report(1.0, "/diagnostics", "gps: fix topic status", 2, "Frequency too low.")
+    assert reported(slow) == "diagnostics: gps: fix topic status: Frequency too low"
 
 
 Change = Callable[[Any, float], None]

@@ -12,6 +12,7 @@ from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive
 from care_core.ecosystems.ros.falls import Fall
 from care_core.ecosystems.ros.messages import (
     BATTERY,
+    COMMANDS,
     DIAGNOSTICS,
     FAULT_EVENT,
     MESSAGES,
@@ -32,7 +33,7 @@ _AFTER_S = 1e-3
 """How long after a fall begins what is seen with it."""
 _UNREAD = "not decoded "
 """How the facts about encodings begin that no reader knows."""
-_STREAMS = {ODOMETRY: "odometry", SCAN: "laser", BATTERY: "battery"}
+_STREAMS = {ODOMETRY: "odometry", **dict.fromkeys(COMMANDS, "commands"), SCAN: "laser", BATTERY: "battery"}
 """What counts where there is more than a little of it, and plausible."""
 _TELLING = ("odometry", "goals", "commands", "laser", "battery", "messages")
 """What tells how a robot did."""
@@ -91,7 +92,7 @@ def _nothing_of_a_robot(drive: Drive) -> str:
     """What is there, so that its reader sees that it was read, and what would be needed."""
     there = {type_of(channel) for channel in drive.channels if channel.count}
     labels = list(dict.fromkeys(row.label for type, row in MESSAGES.items() if type in there and row.label))
-    poor = [word for type, word in _STREAMS.items() if type in there]
+    poor = list(dict.fromkeys(word for type, word in _STREAMS.items() if type in there))
     lacks = f"no {listed([word for word in _TELLING if word not in poor], 'or')}"
     if poor:
         lacks += f", and too little or nothing plausible of {listed(poor, 'and')}"

@@ -39,7 +39,7 @@ from care_core.ecosystems.ros.recoveries import announced, repairs
 from care_core.ecosystems.timeline import counted
 from care_core.logs.ros_message import short_name
 from care_core.numbers import Floats
-from care_core.text import log_time
+from care_core.text import log_time, shortened
 
 _GOALS, _MESSAGES, _REPORTS, _CHANGES, _CONTACTS = 12, 14, 6, 5, 6
 """Lines of each sort at most."""
@@ -104,7 +104,7 @@ def _goals(drive: Drive) -> Iterator[Event]:
             continue
         place = "" if math.isnan(goal.x) else f" at ({goal.x:.1f}, {goal.y:.1f})"
         took = f"after {goal.time_s:.0f} s"
-        why = f": {goal.text[:_TEXT]}" if goal.text and goal.failed else ""
+        why = f": {_cut(goal.text)}" if goal.text and goal.failed else ""
         what = f"{goal.outcome} {took}{why}" if goal.outcome else f"still open {took}, when the recording ends"
         yield Event(goal.end_s, "goal", f"goal {number}{place}, sent at {log_time(goal.sent_s)}, {what}", goal.action)
     if len(shown) < len(goals):
@@ -286,5 +286,4 @@ def _listed(names: Iterable[str], most: int = 6) -> str:
 
 
 def _cut(text: str) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= _TEXT else line[: _TEXT - 3] + "..."
+    return shortened(" ".join(text.split()), _TEXT)

@@ -13,7 +13,7 @@ from care_core.ecosystems.measures import Mission
 from care_core.ecosystems.vehicles import error_kind as kind_of_error
 from care_core.ecosystems.vehicles import error_words
 from care_core.run import is_known
-from care_core.text import log_time
+from care_core.text import log_time, shortened
 
 WAYPOINT_TOLERANCE_M = 5.0
 _FAILSAFE_OF = re.compile(r"battery|radio|throttle|GCS|EKF|terrain|fence|leak|GPS|vibration", re.IGNORECASE)
@@ -77,5 +77,5 @@ def _spoken(text: str, kind: str) -> str:
         return "crash detected"
     about = _FAILSAFE_OF.search(text)
     if about is None:
-        return text[:_LONGEST]
+        return shortened(text, _LONGEST)
     return f"{about[0] if about[0].isupper() else about[0].lower()} failsafe"

@@ -12,6 +12,7 @@ from care_core.ecosystems.ros.checks.timing import is_late
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import DIAGNOSTICS, FAULT_EVENT, GOALS, ROSOUT, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, Report
+from care_core.text import shortened
 
 LIMITS = Limits()
 MOST = int(LIMITS.add("kinds of error that are reported", 3, "", "what fails first brings about the rest"))
@@ -30,6 +31,9 @@ _ABOUT: tuple[tuple[re.Pattern[str], FindingKind], ...] = (
     (re.compile(r"\bcpu\b|memory|temperature|load", re.IGNORECASE), "cpu"),
     (re.compile(r"camera|topic|frequency|rate", re.IGNORECASE), "topics"),
 )
+_OF_TOPIC = re.compile(r"(?P<node>.+?): (?P<topic>\S+) topic status")
+_NOTHING = "No events recorded"
+"""How diagnostic_updater names what it watches of a topic, and what it says where that was never published."""
 _TRACEBACK = "Traceback (most recent call last)"
 _RAISED = re.compile(r'File "(?:.*/)?([^/"]+)", line (\d+), in (\w+)')
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
@@ -58,7 +62,7 @@ def _diagnostics(drive: Drive) -> Iterator[Finding]:
         again = (f", {len(bad)} times" if len(bad) > 1 else "") + (", and so to the end" if stays else "")
         yield Finding(
             kind=about(f"{name} {first.message}"),
-            title=f"{first.by}: {name}: {first.message or 'error'}",
+            title=reported(first),
             onset_s=first.time_s,
             end_s=drive.duration_s if stays else last[name].time_s,
             severity=drive.severity(first.time_s, "critical" if first.level == BAD else "warning"),
@@ -66,6 +70,14 @@ def _diagnostics(drive: Drive) -> Iterator[Finding]:
             source=first.topic,
             probability=0.7,
         )
+
+
+def reported(report: Report) -> str:
+    """What diagnostics say of a part; of what nothing was ever published, in those words."""
+    topic = _OF_TOPIC.fullmatch(report.name)
+    if topic is not None and report.message.startswith(_NOTHING):
+        return f"{report.by}: {topic['node']} publishes nothing on {topic['topic']}"
+    return f"{report.by}: {report.name}: {report.message.rstrip('. ') or 'error'}"
 
 
 def _errors(drive: Drive) -> Iterator[Finding]:
@@ -102,11 +114,11 @@ def _severity(drive: Drive, first: LogMessage, fatal_s: float | None) -> Severit
 def gist(text: str, most: int = 80) -> str:
     """What an error says in a line: of a Python traceback the exception and where its own code raised it."""
     if _TRACEBACK not in text:
-        return text[:most]
+        return shortened(" ".join(text.split()), most)
     lines = [line.strip() for line in text.strip().splitlines() if line.strip()]
     raised = [match for line in lines if (match := _RAISED.match(line))]
     place = f" ({raised[-1][1]} line {raised[-1][2]}, {raised[-1][3]})" if raised else ""
-    return f"{lines[-1][:most]}{place}"
+    return f"{shortened(lines[-1], most)}{place}"
 
 
 _READS = reading(DIAGNOSTICS, FAULT_EVENT, *ROSOUT, *GOALS)
