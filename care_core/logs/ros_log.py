@@ -129,6 +129,8 @@ class _Broken(Record):
 
 _DECODED = ("ros1", "cdr", "json")
 """Encodings of messages."""
+_OF_ROS = {"ros1", "cdr"}
+"""Encodings of ROS alone; JSON may be anybody's, of types with a slash it is ROS's."""
 
 
 _NUMBERS = frozenset((
@@ -204,12 +206,15 @@ class RosLog:
 
     @property
     def facts(self) -> Mapping[str, str]:
-        """`ros` (1 or 2), `stack` where it can be told, `distro`, what the recorder noted, and undecoded encodings."""
+        """`ros` (1 or 2), unless no message is encoded as ROS does, `stack` where it can be told, `distro`, what the
+        recorder noted, and undecoded encodings."""
         every = [connection for part in self._parts for connection in part.connections.values()]
         types = {short_name(connection.type) for connection in every}
         topics = {connection.topic for connection in every}
         encodings = {connection.encoding for connection in every}
-        facts = {"ros": "1" if self.format is formats.ROS1_BAG or encodings == {"ros1"} else "2"}
+        facts = {}
+        if self.format is not formats.MCAP or not encodings or encodings & _OF_ROS or any("/" in one for one in types):
+            facts["ros"] = "1" if self.format is formats.ROS1_BAG or encodings == {"ros1"} else "2"
         stack = next((name for name, own, names in _STACKS if types & set(own) or topics & set(names)), None)
         if stack:
             facts["stack"] = stack

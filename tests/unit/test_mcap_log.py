@@ -190,6 +190,8 @@ def test_a_file_with_nothing_to_decode_still_tells_when_its_messages_came(tmp_pa
     assert [(channel.name, channel.count) for channel in log.channels()] == [("/proto", 1)]
     health = examine(run_model(log))
     assert health.too_little == "its messages are (protobuf), not ROS 1, CDR or JSON: only when they came is known"
+    assert health.robot == "robot without messages of ROS"
+    assert "ros" not in log.facts
 
 
 def test_a_service_event_does_not_hide_the_rest(tmp_path: Path) -> None:

@@ -61,7 +61,9 @@ def _with_fall(found: Iterable[Finding], fall: Fall | None) -> Iterator[Finding]
 
 
 def _robot(drive: Drive) -> str:
-    ros = drive.facts.get("ros", "1")
+    ros = drive.facts.get("ros")
+    if ros is None:
+        return "robot without messages of ROS"
     stack = _STACKS.get(drive.facts.get("stack", ""), "")
     distro = drive.facts.get("distro", "")
     return f"ROS {ros}{f' {distro}' if distro else ''} robot{f' with {stack}' if stack else ''}"
