@@ -627,6 +627,18 @@ def test_a_sensor_whose_messages_are_held_back_is_late(until_s: float, titles: l
     assert [one.title for one in looked_at(HeldBack(), tmp_path).findings] == titles
 
 
+@pytest.mark.parametrize(("times", "titles"), [(40, ["commands come without a pause: a loop has no rate"]), (4, [])])
+def test_commands_of_a_loop_without_a_rate_are_told(times: int, titles: list[str], tmp_path: Path) -> None:
+    class Flooding(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                for number in range(times * 5 if name == TWIST else 1):
+                    yield topic, name, time_s + number / (times * 25), message
+
+    found = looked_at(Flooding(), tmp_path).findings
+    assert [(one.title, one.severity) for one in found] == [(title, "info") for title in titles]
+
+
 class Silenced(Drive):
     """Of which topics end, or pause, in a time: (topic's type, from, to)."""
 

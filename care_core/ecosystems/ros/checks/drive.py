@@ -55,6 +55,9 @@ RESTS_M = LIMITS.add("way in a standstill", 0.03, "m", "it stops and starts in i
 REPEATED = int(LIMITS.add("samples of a standstill of odometry alone", 4, "", "drivers repeat a pose 2 to 4 times"))
 KEEPS_UP = LIMITS.add("share of its speed that a robot keeps over a second", 0.7, "", "a stop of 0.3 s costs as much")
 GOES_ON_S = LIMITS.add("time that it drives on", 1.5, "s", "drivers stop after 0.5 s, and it takes a second to stand")
+FLOOD_HZ = LIMITS.add("commands a second", 500.0, "1/s", "base drivers take 10 to 100; more is a loop without a pause")
+FLOODED = LIMITS.add("share of them", 0.9, "", "else they come at a rate, and at times in bursts")
+FLOOD = LIMITS.add("commands that come so", 1000, "", "two seconds of them: a burst may be what a link held back")
 RHYTHM = LIMITS.add("pauses as long that came before", 2, "", "one may be an outage; two are how it is commanded")
 GOES_ON = LIMITS.add("share of its speed that it keeps", 0.6, "", "less is coming to a stop")
 LOST_S = LIMITS.add("pause between samples", 3.0, "s", "over a longer one nobody knows whether the robot stood")
@@ -79,6 +82,7 @@ OBEYS = LIMITS.add("share of them that stand", 0.1, "", "standing still for an i
 def find(drive: Drive) -> Iterator[Finding]:
     """Commands that are none, standstills against commands, short and long, weakness, and a pull to one side."""
     yield from _numberless(drive)
+    yield from _flooded(drive)
     yield from _uncommanded(drive)
     motion = drive.following
     if motion is None:
@@ -154,6 +158,26 @@ def _numberless(drive: Drive) -> Iterator[Finding]:
         severity=drive.severity(first),
         evidence=f"{count} of {count + len(commands.t)} messages hold none",
         source=commands.topic,
+        suspect="operation",
+        probability=0.8,
+    )
+
+
+def _flooded(drive: Drive) -> Iterator[Finding]:
+    """Commands as fast as a processor can send them: they fill queues and links, and take its time from others."""
+    times = np.empty(0) if drive.commands is None else drive.times[drive.commands.topic]
+    rapid = np.diff(times) < 1.0 / FLOOD_HZ
+    if np.count_nonzero(rapid) < FLOOD or rapid.mean() < FLOODED:
+        return
+    assert drive.commands is not None
+    yield Finding(
+        kind="commands",
+        title="commands come without a pause: a loop has no rate",
+        onset_s=float(times[0]),
+        end_s=float(times[-1]),
+        severity="info",
+        evidence=f"{len(times)} on {drive.commands.topic} in {times[-1] - times[0]:.0f} s (limit {FLOOD_HZ:g}/s)",
+        source=drive.commands.topic,
         suspect="operation",
         probability=0.8,
     )
