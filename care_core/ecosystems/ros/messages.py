@@ -38,6 +38,7 @@ RECOVERY = "move_base_msgs/RecoveryStatus"
 TRANSITION = "lifecycle_msgs/TransitionEvent"
 TF = ("tf2_msgs/TFMessage", "tf/tfMessage")
 LOCALISED = "geometry_msgs/PoseWithCovarianceStamped"
+FIX = "sensor_msgs/NavSatFix"
 POSE, PATH = "geometry_msgs/PoseStamped", "nav_msgs/Path"
 NAVIGATION = "nav2_msgs/NavigateToPose_FeedbackMessage"
 ACTION_GOAL, ACTION_RESULT = "ActionGoal", "ActionResult"
@@ -180,7 +181,7 @@ MESSAGES: Mapping[str, RosMessage] = {
     ACTION_RESULT: _reads("status.goal_id.id", "status.status", "status.text"),
     LOCALISED: RosMessage(_POSE, reads=tuple(_POSE), at_most=20_000, label="poses"),
     **dict.fromkeys((POSE, "geometry_msgs/TransformStamped"), _reads(label="poses")),
-    "sensor_msgs/NavSatFix": _reads(label="satellite positions"),
+    FIX: _reads("status.status", "latitude", "longitude", at_most=20_000, label="satellite positions"),
     **dict.fromkeys(("sensor_msgs/Image", "sensor_msgs/CompressedImage"), _reads(label="images")),
     CLOUD: _reads(label="point clouds"),
     "sensor_msgs/JointState": _reads(label="joint states"),

@@ -21,6 +21,7 @@ from care_core.ecosystems.ros.checks import (
     parameters,
     planner,
     recorded,
+    satellites,
     timing,
     topics,
 )
@@ -36,6 +37,7 @@ CHECKS: tuple[Check[Drive], ...] = (
     blocked.CHECK,
     contacts.CHECK,
     imu.CHECK,
+    satellites.CHECK,
     topics.CHECK,
     late.CHECK,
     planner.CHECK,
