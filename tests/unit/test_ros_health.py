@@ -27,6 +27,7 @@ from tests.ros_samples import (
     McapFile,
     cdr,
     imu,
+    make,
     random_message,
     stamp,
     write_db3,
@@ -637,6 +638,34 @@ def test_commands_of_a_loop_without_a_rate_are_told(times: int, titles: list[str
 
     found = looked_at(Flooding(), tmp_path).findings
     assert [(one.title, one.severity) for one in found] == [(title, "info") for title in titles]
+
+
+class Shown(Drive):
+    """A robot that tips over, which its transforms alone show: odometry is flat, and there is no IMU."""
+
+    parent: str = "odom"
+
+    def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+        yield from super().messages()
+        for tick in range(400):
+            t = tick / 10
+            angle = np.radians(np.clip((t - FAILS_AT_S) * 60.0, 0.0, 80.0))
+            turn = make(
+                ROS2, "geometry_msgs/msg/Quaternion", float(np.sin(angle / 2)), 0.0, 0.0, float(np.cos(angle / 2))
+            )
+            move = make(
+                ROS2, "geometry_msgs/msg/Transform", make(ROS2, "geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0), turn
+            )
+            header = make(ROS2, "std_msgs/msg/Header", stamp(ROS2, START_NS + round(t * SECOND_NS)), self.parent)
+            one = make(ROS2, "geometry_msgs/msg/TransformStamped", header, "robot1/base_link", move)
+            yield "/tf", "tf2_msgs/msg/TFMessage", t, make(ROS2, "tf2_msgs/msg/TFMessage", [one])
+
+
+@pytest.mark.parametrize(("parent", "titles"), [("odom", ["the robot tips over"]), ("camera", [])])
+def test_a_fall_that_transforms_alone_show_is_told(parent: str, titles: list[str], tmp_path: Path) -> None:
+    findings = looked_at(Shown(parent=parent), tmp_path).findings
+    assert [one.title for one in findings] == titles
+    assert all(one.onset_s == pytest.approx(FAILS_AT_S + 0.4, abs=0.5) for one in findings)
 
 
 class Silenced(Drive):

@@ -34,6 +34,7 @@ from care_core.ecosystems.ros.messages import (
     ROSOUT,
     SCAN,
     STATUS,
+    TF,
     TWIST,
     TWIST_STAMPED,
     holds,
@@ -49,6 +50,7 @@ from care_core.ecosystems.ros.node_messages import LogMessage, Report, faults, l
 from care_core.ecosystems.ros.plugin_names import created
 from care_core.ecosystems.ros.posed_goals import posed_goals, section_of
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
+from care_core.ecosystems.ros.shown_tilt import shown_tilts
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
 from care_core.numbers import Floats, median, quantile
 from care_core.records import Record
@@ -380,7 +382,8 @@ class Drive(RunModel):
         if self.odometry is None or (self.commands is None and not self.goals):
             return None
         odometry = self.odometry
-        return fall_of(odometry.topic, odometry.t, odometry.tilt, odometry.z, odometry.path_m) or self._felt_fall()
+        told = fall_of(odometry.topic, odometry.t, odometry.tilt, odometry.z, odometry.path_m)
+        return told or self._felt_fall() or self._shown_fall()
 
     def _felt_fall(self) -> Fall | None:
         """The same by an IMU, where it tells an orientation."""
@@ -389,6 +392,16 @@ class Drive(RunModel):
             if holds(table, IMU):
                 tilt = tilt_of(table, IMU, "orientation")
                 return fall_of(topic, table.t, tilt, np.zeros(len(table)), self.odometry.path_m)
+        return None
+
+    def _shown_fall(self) -> Fall | None:
+        """The same by the transforms of its base, of which neither says anything."""
+        assert self.odometry is not None
+        for topic, table in self.of(*TF):
+            for t, tilt in shown_tilts(table) if holds(table, TF[0]) else ():
+                found = fall_of(topic, t, tilt, np.zeros(len(t)), self.odometry.path_m)
+                if found is not None:
+                    return found
         return None
 
     # Sensors

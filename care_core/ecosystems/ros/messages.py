@@ -171,6 +171,7 @@ MESSAGES: Mapping[str, RosMessage] = {
     TRANSITION: _reads("start_state.label", "goal_state.label"),
     **dict.fromkeys(TF, _reads(
         "transforms.header.frame_id", "transforms.child_frame_id", f"{_TRANSFORM}.x", f"{_TRANSFORM}.y",
+        *(f"transforms.transform.rotation.{axis}" for axis in "xyzw"),
         at_most=10_000, label="transforms",
     )),
     ACTION_GOAL: _reads(
@@ -241,10 +242,15 @@ def yaw_of(table: Table, prefix: str) -> Floats:
 
 def tilt_of(table: Table, type: str, prefix: str) -> Floats:
     """Angle of the robot's upward axis to what it was at first, deg, shape (n,); zero without an orientation."""
-    x, y, z, w = (believable(table, type, f"{prefix}.{axis}") for axis in "xyzw")
+    tilt = lean(*(believable(table, type, f"{prefix}.{axis}") for axis in "xyzw"))
+    return np.zeros(len(table)) if tilt is None else tilt
+
+
+def lean(x: Floats, y: Floats, z: Floats, w: Floats) -> Floats | None:
+    """The same of unit quaternions, each part of shape (n,); None where one is none."""
     length = x * x + y * y + z * z + w * w
     if not np.isfinite(length).all() or not np.all(np.abs(length - 1) < _UNIT_ERROR):
-        return np.zeros(len(table))
+        return None
     up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
     first = median(up[: max(5, len(up) // 50)], axis=0)
     angle: Floats = np.degrees(np.arccos(np.clip(up @ (first / np.linalg.norm(first)), -1, 1)))

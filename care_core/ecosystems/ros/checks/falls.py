@@ -11,7 +11,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros import falls
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.falls import Fall
-from care_core.ecosystems.ros.messages import COMMANDS, GOALS, IMU, ODOMETRY, reading
+from care_core.ecosystems.ros.messages import COMMANDS, GOALS, IMU, ODOMETRY, TF, reading
 from care_core.text import log_time
 
 LIMITS = Limits()
@@ -94,5 +94,5 @@ def _wants_on(drive: Drive, at: float) -> bool:
     return motion is not None and int(np.count_nonzero(motion.to_move & (motion.odometry.t > at + HELD_S))) > 0
 
 
-READS = reading(ODOMETRY, IMU, *COMMANDS, *GOALS)
+READS = reading(ODOMETRY, IMU, *TF, *COMMANDS, *GOALS)
 CHECK = Check("falls", "a robot that tips over, or is held by what it hit", READS, LIMITS, find)
