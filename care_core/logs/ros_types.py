@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 from care_core import limits
+from care_core.logs.base_types import DEFINITIONS
 from care_core.logs.cdr_message import wide_size
 from care_core.logs.ros_message import MalformedMessageError, MessageField, Types, parse_definition, short_name
 
@@ -78,6 +79,8 @@ def _bundled(type_name: str, distro: str) -> Iterator[Types]:
         text = _bundled_text(name, _long_name(type_name))
         if text is not None:
             yield _filled(parse_definition(type_name, text))
+    if _long_name(type_name) in DEFINITIONS:
+        yield parse_definition(type_name, DEFINITIONS[_long_name(type_name)])
 
 
 @lru_cache(maxsize=256)

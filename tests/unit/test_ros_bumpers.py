@@ -14,6 +14,8 @@ from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros import ECOSYSTEM, bumpers
 from care_core.logs.base import Channel, Table
 from care_core.logs.opening import open_log
+from care_core.logs.ros_message import MalformedMessageError
+from care_core.logs.ros_types import cdr_types
 from tests.ros_drives import Drive
 from tests.ros_samples import ROS2, make
 
@@ -29,6 +31,7 @@ BOOL = "std_msgs/msg/Bool"
         ("/mobile_base/events/bumper", "kobuki_msgs/BumperEvent", True),
         ("/bump", "neato_node/Bump", True),
         ("/hazard_detection", "irobot_create_msgs/msg/HazardDetectionVector", True),
+        ("/bump", "my_msgs/msg/Bump", False),
         ("/bumper", "gazebo_msgs/msg/ContactsState", False),
         ("/bumper/pose", "geometry_msgs/msg/PoseStamped", False),
     ],
@@ -96,3 +99,13 @@ def test_a_pressed_bumper_is_told(for_s: float, title: str, severity: str, tmp_p
 
 def test_a_bumper_that_nobody_presses_is_no_finding(tmp_path: Path) -> None:
     assert looked_at(Bumping(for_s=0.0), tmp_path).findings == ()
+
+
+def test_types_that_a_recording_of_humble_does_not_define_are_known() -> None:
+    pressed = bytes.fromhex("0001000001000100")
+    types, _ = cdr_types("neato2_interfaces/msg/Bump", "", "", "humble", pressed)
+    assert [one.name for one in types["neato2_interfaces/Bump"]][:2] == ["left_front", "left_side"]
+    hazards, _ = cdr_types("irobot_create_msgs/msg/HazardDetectionVector", "", "", "humble", b"")
+    assert [one.name for one in hazards["irobot_create_msgs/HazardDetection"]] == ["header", "type"]
+    with pytest.raises(MalformedMessageError):
+        cdr_types("my_msgs/msg/Bump", "", "", "humble", pressed)

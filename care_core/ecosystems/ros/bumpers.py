@@ -22,6 +22,10 @@ FIELDS = (
 _BUMP = re.compile(r"bump", re.IGNORECASE)
 _PLAIN = ("std_msgs/Bool", "std_msgs/Int8MultiArray", "std_msgs/UInt8MultiArray")
 """Types of anything: the topic's name has to say what they are."""
+_OF_BUMPERS = (
+    "kobuki_msgs/BumperEvent", "kobuki_ros_interfaces/BumperEvent", "neato_node/Bump", "neato2_interfaces/Bump",
+    "create_msgs/Bumper", "ca_msgs/Bumper",
+)  # fmt: skip
 _HAZARDS, _IS_BUMP = "irobot_create_msgs/HazardDetectionVector", 1
 _MOSTLY = 0.9
 """A switch that is pressed for this share of its messages is wired the other way, or stuck: it tells of nothing."""
@@ -34,7 +38,7 @@ def is_bumper(channel: Channel) -> bool:
     type = short_name(channel.type)
     if type in _PLAIN:
         return bool(_BUMP.search(channel.name))
-    return type == _HAZARDS or bool(_BUMP.search(type.rpartition("/")[2]))
+    return type == _HAZARDS or type in _OF_BUMPERS
 
 
 def contacts(table: Table, end_s: float) -> Iterator[tuple[float, float]]:
