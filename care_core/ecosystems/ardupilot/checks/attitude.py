@@ -44,6 +44,8 @@ _LOST = LIMITS.add("probability of a part, control lost", 0.3, "", "a choice: co
 _AFTER_S = LIMITS.add("attitude looked at after control was lost", 5.0, "s", "a choice")
 _OVER = LIMITS.add("probability of what lies upside down", 0.5, "", "a choice: it turned, or its board is mounted so")
 LIMITS.add("tilt of what is upside down", UPSIDE_DOWN_DEG, "deg", "a choice: no slope and no wave")
+UPSIDE_DOWN = "the vehicle is upside down"
+"""Of what lay so before anybody looked, and did not turn over."""
 _KEEP_UPRIGHT = frozenset(("rover", "sub"))
 _ANY_WAY_UP = frozenset((1, 19))
 """Modes of a submarine in which the pilot may turn it over: acro, manual (ArduSub/mode.h)."""
@@ -117,7 +119,7 @@ def _upside_down(flight: Flight) -> Iterator[Finding]:
     turned = len(before) > 0 and float(np.min(before)) < UPSIDE_DOWN_DEG / 2
     yield Finding(
         kind="attitude",
-        title="the vehicle turned over" if turned else "the vehicle is upside down",
+        title="the vehicle turned over" if turned else UPSIDE_DOWN,
         onset_s=start,
         end_s=end,
         severity="critical",

@@ -22,6 +22,9 @@ _HARMS = LIMITS.add("probability that a change in the air harms", 0.2, "", "a ch
 _NAMED = 5
 _LEARNED = ("MOT_THST_HOVER", "COMPASS_OFS", "COMPASS_DEC", "INS_GYR", "STAT_", "_CAL", "_ID")
 """What the firmware itself writes while it flies."""
+_PUT_RIGHT = frozenset(("WPNAV_ACCEL", "WPNAV_SPEED", "WPNAV_RADIUS"))
+"""What the firmware sets to its default as a mode begins that needs it, where it was not above 0
+(AC_WPNav::wp_and_spline_init)."""
 _AUTOTUNE = range(30, 38)
 """EV records of a tune, which changes gains by itself."""
 
@@ -34,7 +37,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     changed = [
         one
         for one in changed_in_flight.changes(flight.settings, flown)
-        if not any(word in one.name for word in _LEARNED)
+        if not any(word in one.name for word in _LEARNED) and not _was_put_right(one)
     ]
     if not changed:
         return
@@ -47,11 +50,18 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _upsets(flight: Flight) -> Iterator[Upset]:
-    """When it did not follow its demand, swung, was lost or hit the ground."""
+    """When it did not follow its demand, swung, was lost or hit the ground. What lies upside down from the start is not
+    upset when a mode begins that minds it."""
     for left_s in flight.left_demand:
         yield Upset(left_s, "its attitude was 30 degrees off its target")
     for one in (*attitude.find(flight), *crash.find(flight)):
-        yield Upset(one.onset_s, one.title)
+        if one.title != attitude.UPSIDE_DOWN:
+            yield Upset(one.onset_s, one.title)
+
+
+def _was_put_right(change: Change) -> bool:
+    """Whether the firmware itself replaced a value that it cannot use."""
+    return change.name in _PUT_RIGHT and isinstance(change.before, float | int) and change.before <= 0
 
 
 def _noted(changed: list[Change]) -> Iterator[Finding]:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.airborne import UPSIDE_DOWN_DEG
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
@@ -18,6 +19,8 @@ from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 
+_MANUAL = 19
+"""Mode of a submarine in which the sticks drive the thrusters and nothing is held (ArduSub/mode_manual.cpp)."""
 READS: Wanted = {"RATE": ("ROut", "YOut"), "ATT": ("DesRoll", "DesYaw")}
 
 LIMITS = Limits()
@@ -39,12 +42,15 @@ def find(flight: Flight) -> Iterator[Finding]:
     if flight.kind != "sub" or table is None or asked is None or len(asked) < 3:
         return
     t = table.t
+    steered = flight.modes_at(t) != _MANUAL
+    if (tilt := flight.tilt) is not None:
+        steered &= np.interp(t, *tilt) < UPSIDE_DOWN_DEG  # what lies on its back fights to turn, not to hold still
     found = []
     for axis, named, limit in (("Roll", "roll", _ROLL), ("Yaw", "heading", _HEADING)):
         held = smooth(t, table[f"{axis[0]}Out"], _OVER_S)
         turns = np.gradient(np.degrees(np.unwrap(np.radians(asked[f"Des{axis}"]))), asked.t)
         still = np.interp(t, asked.t, np.abs(smooth(asked.t, turns, _OVER_S))) < _STILL_DPS
-        spans = lasting(t, (np.abs(held) > limit) & still & during(flight.watched, t), _LASTS_S, gap_s=4.0)
+        spans = lasting(t, (np.abs(held) > limit) & still & steered & during(flight.watched, t), _LASTS_S, gap_s=4.0)
         if spans:
             took = float(median(np.abs(held)[during(spans, t)]))
             found.append((took / limit, named, took, limit, spans))

@@ -1,0 +1,53 @@
+"""What sound parts do and operators mean is no finding: each of these was once taken for a part that failed."""
+
+from __future__ import annotations
+
+import pytest
+
+from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.findings import every_finding
+from care_core.run import Setting
+from tests.flights import END_S, Made, flight_of
+
+HEIGHTS = (("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt"), ("POS", "RelHomeAlt"), ("GPS", "Alt"))
+
+
+def titles(made: Made) -> list[str]:
+    return [one.title for one in every_finding(made.find())]
+
+
+def dive_in(*modes: tuple[float, float]) -> Made:
+    dive = Made()
+    dive.facts = {"firmware": "ArduSub V4.5.0"}
+    dive.rows["MODE"] = [(at, {"ModeNum": number}) for at, number in modes]
+    dive.table["ATT"]["DesYaw"][:] = 90.0
+    dive.table["RATE"] = {"ROut": dive.noise(0.02), "YOut": dive.noise(0.02)}
+    return dive
+
+
+def test_a_stick_that_steers_a_submarine_by_hand_shows_no_weak_thruster() -> None:
+    dive = dive_in((0.0, 19.0))
+    dive.table["RATE"]["YOut"][dive.after(40.0, 60.0)] = 0.3
+    assert not [title for title in titles(dive) if "thruster" in title]
+
+
+def test_what_lay_on_its_back_before_a_parameter_was_changed_was_not_upset_by_it() -> None:
+    dive = dive_in((0.0, 19.0), (50.0, 4.0))
+    dive.table["ATT"]["Roll"][:] = 170.0
+    dive.table["RATE"]["ROut"][:] = 1.0
+    flight = dive.flight()
+    for name, before in (("WPNAV_ACCEL", 0.0), ("PILOT_SPEED", 50.0)):
+        changed = (Setting(name, before, "PARM"), Setting(name, 100.0, "PARM", changed_at_s=50.0))
+        found = find(flight_of(dive.tables(), {**flight.settings, name: changed}, dive.facts, END_S))
+        said = [one.title for one in every_finding(found)]
+        assert "the vehicle is upside down" in said
+        assert not [title for title in said if "changed in flight" in title or "thruster" in title]
+
+
+@pytest.mark.parametrize(("before", "is_blamed"), [(0.0, False), (50.0, True)])
+def test_what_the_firmware_puts_right_as_a_mode_begins_upset_nothing(before: float, is_blamed: bool) -> None:
+    made = Made()
+    made.table["ATT"]["Roll"][made.after(52.0)] += 90.0
+    changed = (Setting("WPNAV_ACCEL", before, "PARM"), Setting("WPNAV_ACCEL", 100.0, "PARM", changed_at_s=50.0))
+    found = find(flight_of(made.tables(), {**made.known, "WPNAV_ACCEL": changed}, made.facts, END_S))
+    assert any(one.title.startswith("WPNAV_ACCEL was changed") for one in every_finding(found)) == is_blamed
