@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from care_core.ecosystems.ardupilot.examining import find
-from care_core.ecosystems.findings import every_finding
+from care_core.ecosystems.findings import NO_BATTERY, every_finding
 from care_core.run import Setting
 from tests.flights import END_S, Made, flight_of
 
@@ -51,3 +52,14 @@ def test_what_the_firmware_puts_right_as_a_mode_begins_upset_nothing(before: flo
     changed = (Setting("WPNAV_ACCEL", before, "PARM"), Setting("WPNAV_ACCEL", 100.0, "PARM", changed_at_s=50.0))
     found = find(flight_of(made.tables(), {**made.known, "WPNAV_ACCEL": changed}, made.facts, END_S))
     assert any(one.title.startswith("WPNAV_ACCEL was changed") for one in every_finding(found)) == is_blamed
+
+
+def test_a_failsafe_of_a_monitor_that_gains_in_the_air_is_of_no_battery() -> None:
+    made = Made()
+    del made.settings["MOT_BAT_VOLT_MAX"]
+    made.settings["BATT_LOW_VOLT"] = 10.5
+    made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
+    made.table["BAT"]["Volt"] = np.interp(made.t, [0.0, END_S], [5.95, 6.1])
+    finding = made.find()[0]
+    assert (finding.title, finding.parameters) == (NO_BATTERY, ())
+    assert "no pack gains by flying" in finding.evidence

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot import sources
 from care_core.ecosystems.ardupilot.battery import Battery, within_reason
 from care_core.ecosystems.ardupilot.checks.settings import supply
 from care_core.ecosystems.ardupilot.flight import Flight
@@ -61,6 +62,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         alive = within_reason(battery.table)
         if len(alive) >= 3 and np.ptp(alive["Volt"]) > 0:
             yield from _pack(flight, battery, alive)
+    if not flight.batteries:
+        yield from filter(None, (_of_no_battery(flight, one) for one in flight.all("BAT", "Volt")[:1]))
     yield from _board(flight)
 
 
@@ -134,10 +137,12 @@ def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: f
 
 
 def _of_no_battery(flight: Flight, table: Table) -> Finding | None:
-    """A failsafe of a monitor that measures nothing of the battery."""
+    """A failsafe of a monitor that measures nothing of the battery. At 0 V the firmware takes none for low
+    (AP_BattMonitor_Backend::update_failsafes)."""
     failsafe = flight.battery_failsafe_s
     volts = 0.0 if failsafe is None or not len(table) else float(np.interp(failsafe, table.t, table["Volt"]))
-    if failsafe is None or not 0.0 < volts < supply.DRIVES_V:
+    why = sources.no_pack_on(table, flight.hovering) if len(table) else ""
+    if failsafe is None or volts <= 0.0 or (volts >= supply.DRIVES_V and not why):
         return None
     return Finding(
         kind="battery",
@@ -145,7 +150,8 @@ def _of_no_battery(flight: Flight, table: Table) -> Finding | None:
         onset_s=failsafe,
         end_s=flight.end_s,
         severity="critical",
-        evidence=f"{volts:.1f} V drive no vehicle: look at its wiring and its pin; the thresholds are not to blame",
+        evidence=(f"{volts:.1f} V drive no vehicle" if volts < supply.DRIVES_V else why)
+        + ": look at its wiring and its pin; the thresholds are not to blame",
         source="BAT.Volt; battery failsafe",
         probability=_NOTHING,
     )
