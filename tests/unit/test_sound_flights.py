@@ -63,3 +63,11 @@ def test_a_failsafe_of_a_monitor_that_gains_in_the_air_is_of_no_battery() -> Non
     finding = made.find()[0]
     assert (finding.title, finding.parameters) == (NO_BATTERY, ())
     assert "no pack gains by flying" in finding.evidence
+
+
+def test_a_blow_that_two_accelerometers_feel_at_other_moments_sets_them_not_apart() -> None:
+    made = Made()
+    made.table["IMU"]["AccZ"][np.argmin(np.abs(made.t - 60.0))] = -800.0
+    assert "the accelerometers disagree" not in titles(made)
+    made.table["IMU"]["AccX"] += 8.0
+    assert "the accelerometers disagree" in titles(made)

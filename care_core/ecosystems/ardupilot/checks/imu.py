@@ -24,6 +24,7 @@ from care_core.ecosystems.ardupilot.statistics import (
     length,
     records,
     smooth,
+    steady,
 )
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
@@ -42,6 +43,9 @@ NOISE_DPS = LIMITS.add("noise on the quietest axis", 0.3, "deg/s", "the noisiest
 OFFSET_DPS = LIMITS.add("two gyros apart", 5.0, "deg/s", "AP_Arming: gyros inconsistent")
 OFFSET_ACC = LIMITS.add(
     "two accelerometers apart", 3.0, "m/s^2", "four times ARMING_ACCTHRESH: arms flex, rotation moves sensors apart"
+)
+_APART_OVER_S = LIMITS.add(
+    "window of two accelerometers apart", 10.0, "s", "a choice: an offset stays, a blow does not"
 )
 _DPS_PER_VIBE = LIMITS.add(
     "noise that vibration adds, for each m/s^2", 0.4, "deg/s",
@@ -223,8 +227,8 @@ def _accelerometers(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
         return
     t = sensors[0].t
     differences = [sensors[0][a] - aligned(t, sensors[1].t, sensors[1][a]) for a in ACCELEROMETERS]
-    apart = length(smooth(t, one, 10.0) for one in differences)
-    limit = OFFSET_ACC + _ACC_PER_VIBE * _vibration(flight, t) + _of_a_mean(flight, t, differences, 10.0)
+    apart = length(steady(t, one, _APART_OVER_S) for one in differences)  # a blow is felt by each at another moment
+    limit = OFFSET_ACC + _ACC_PER_VIBE * _vibration(flight, t) + _of_a_mean(flight, t, differences, _APART_OVER_S)
     spans = lasting(t, apart > limit, _LASTS_S)
     if spans:
         inside = (t >= spans[0][0]) & (t <= spans[-1][1])
