@@ -8,7 +8,7 @@ import pytest
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.findings import NO_BATTERY, every_finding
 from care_core.run import Setting
-from tests.flights import END_S, Made, flight_of
+from tests.flights import DOWN_S, END_S, Made, flight_of
 
 HEIGHTS = (("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt"), ("POS", "RelHomeAlt"), ("GPS", "Alt"))
 
@@ -71,3 +71,23 @@ def test_a_blow_that_two_accelerometers_feel_at_other_moments_sets_them_not_apar
     assert "the accelerometers disagree" not in titles(made)
     made.table["IMU"]["AccX"] += 8.0
     assert "the accelerometers disagree" in titles(made)
+
+
+def climbing() -> Made:
+    """With all the throttle from 20 s on, at 3 m/s, the mixer taking from all motors but one."""
+    made = Made()
+    up = made.after(20.0, DOWN_S)
+    made.table["CTUN"]["ThO"][up] = 1.0
+    for name, field in HEIGHTS:
+        made.table[name][field][up] += 3.0 * (made.t[up] - 20.0)
+    for n in range(1, 5):
+        made.table["RCOU"][f"C{n}"][up] = 1950.0 if n == 4 else 1740.0
+    return made
+
+
+def test_a_climb_with_all_the_throttle_is_no_hover_and_shows_no_weak_motor() -> None:
+    assert not [title for title in titles(climbing()) if "hovering takes" in title or "motor 4" in title]
+    hover = climbing()
+    for name, field in HEIGHTS:
+        hover.table[name][field][:] = Made().table[name][field]
+    assert any("motor 4" in title for title in titles(hover))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems import lost_motor
+from care_core.ecosystems.ardupilot.checks.thrust import climbs, saturated
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, means, records
@@ -175,12 +176,14 @@ def _range(flight: Flight, seen: float) -> tuple[float, float]:
 
 def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
     """Rows in which the motors lift it, upright, and nothing else holds it: in the air, or where it never left the
-    ground the first seconds of trying, before the integrators wind up."""
+    ground the first seconds of trying, before the integrators wind up. What climbs with all its throttle lacks no
+    thrust, and its mixer takes from some motors what the attitude wants of the others."""
     t = outputs.t
     lifting = flight.watch(t)
     for rows in pieces(len(t)):
         lifting[rows] &= median(outputs.share(rows), axis=0) > _LIFTING
     lifting &= ~during(flight.held, t)
+    lifting &= ~during([span for span in saturated(flight) if climbs(flight, *span)], t)
     lifting &= _hovers(flight, t)
     if (tilt := flight.tilt) is not None:
         lifting &= np.interp(t, *tilt) < _UPRIGHT_DEG

@@ -54,8 +54,9 @@ def find(flight: Flight) -> Iterator[Finding]:
     if flown.sum() < 5:
         return
     level = smooth(t, throttle, 4.0)
-    high = lasting(t, flown & (level > HOVER_MOST), _LASTS_S, gap_s=5.0)
-    full = [span for span in saturated(flight) if _below(flight, *span) or not _climbs(flight, *span)]
+    spans = lasting(t, flown & (level > HOVER_MOST), _LASTS_S, gap_s=5.0)
+    high = [span for span in spans if not climbs(flight, *span)]
+    full = [span for span in saturated(flight) if _below(flight, *span) or not climbs(flight, *span)]
     if full:
         start, end = full[0][0], full[-1][1]
         below = _below(flight, start, end)
@@ -116,7 +117,7 @@ def _by_option(flight: Flight) -> tuple[SuspectKind, str]:
     return "hardware", ""
 
 
-def _climbs(flight: Flight, start: float, end: float) -> bool:
+def climbs(flight: Flight, start: float, end: float) -> bool:
     """Whether it climbs with all its thrust, as a pilot's stick asks."""
     known = flight.height
     if known is None:
