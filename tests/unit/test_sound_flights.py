@@ -8,7 +8,7 @@ import pytest
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.findings import NO_BATTERY, every_finding
 from care_core.run import Setting
-from tests.flights import DOWN_S, END_S, Made, flight_of
+from tests.flights import DOWN_S, END_S, UP_S, Made, flight_of
 
 HEIGHTS = (("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt"), ("POS", "RelHomeAlt"), ("GPS", "Alt"))
 
@@ -91,3 +91,29 @@ def test_a_climb_with_all_the_throttle_is_no_hover_and_shows_no_weak_motor() -> 
     for name, field in HEIGHTS:
         hover.table[name][field][:] = Made().table[name][field]
     assert any("motor 4" in title for title in titles(hover))
+
+
+@pytest.mark.parametrize(("height_m", "what"), [(0.0, "the ground"), (4.0, "something")])
+def test_what_is_stopped_dead_above_the_ground_hit_something(height_m: float, what: str) -> None:
+    made = Made()
+    hit = made.t >= 50.0
+    made.table["IMU"]["AccX"][np.argmax(hit)] = -150.0
+    made.table["GPS"]["Spd"] = np.where(hit, 0.0, 6.0)
+    for name, field in HEIGHTS:
+        made.table[name][field][made.t > 40.0] = height_m
+    found = made.flight().hit
+    assert found is not None
+    assert found.what == what
+
+
+@pytest.mark.parametrize(("falls_s", "is_steered"), [(60.2, True), (58.0, False)])
+def test_a_mode_that_minds_a_stick_at_its_bottom_brings_a_copter_down(falls_s: float, is_steered: bool) -> None:
+    made = Made(rate_hz=50.0)
+    made.rows["MODE"] = [(0.0, {"ModeNum": 4.0}), (60.0, {"ModeNum": 0.0})]
+    made.table["RCIN"] = {"C3": np.full(len(made.t), 1000.0)}
+    lands_s = falls_s + 1.5
+    for name, field in HEIGHTS:
+        made.table[name][field][:] = np.interp(made.t, [UP_S, 14.0, falls_s, lands_s], [0.0, 10.0, 10.0, 0.0])
+    made.rows["ERR"] = [(max(lands_s, 61.0), {"Subsys": 12.0, "ECode": 1.0})]
+    said = [one.title for one in every_finding(made.find()) if one.kind == "crash"]
+    assert ("it flew into the ground as steered" in said) == is_steered

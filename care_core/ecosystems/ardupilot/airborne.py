@@ -85,12 +85,13 @@ ACRO = frozenset((1, 13, 14))
 
 
 class Hit(NamedTuple):
-    """A contact with the ground at a speed that no landing has."""
+    """A contact with the ground, or with something above it, at a speed that no landing has."""
 
     time_s: float
     speed_ms: float
     said: str
     """What says so, in a clause."""
+    what: str = "the ground"
 
 
 class Airborne(Armed):
@@ -343,7 +344,9 @@ class Airborne(Armed):
                 yield Hit(at, fell, f"it came down at {fell:.1f} m/s into a blow of {blow:.0f} m/s^2")
                 return
             if flew > _FAST_MS and blow > 2 * _SHOCK and is_still:
-                yield Hit(at, flew, f"a blow of {blow:.0f} m/s^2 stopped it dead from {flew:.1f} m/s")
+                is_high = self.height is not None and float(np.interp(at, *self.height)) > AIRBORNE_M
+                said = f"a blow of {blow:.0f} m/s^2 stopped it dead from {flew:.1f} m/s"
+                yield Hit(at, flew, said, "something" if is_high else "the ground")
                 return
 
     def _fell_ms(self, at: float) -> float:

@@ -21,6 +21,9 @@ _TAKEOFF_S = LIMITS.add("tip-over after the first throttle", 15.0, "s", "a choic
 _FIRST_THROTTLE = LIMITS.add("first throttle", 0.15, "", "a choice: MOT_SPIN_MIN as shipped")
 _STICK_LOW = LIMITS.add("throttle stick at its bottom", 1150.0, "us", "a choice: sticks end between 1000 and 1100")
 _STICK_LEAST = LIMITS.add("pulse of a stick", 800.0, "us", "receivers send 800 to 2200; less is no signal")
+_ANSWERS_S = LIMITS.add("time in which a mode acts on the throttle", 0.5, "s", "a choice: motors answer sooner")
+_FALL_S = LIMITS.add("fall that may have begun in another mode", 2.0, "s", "free fall: 20 m")
+_SINKS_M = LIMITS.add("descent in the second before a mode that is a fall", 0.5, "m", "a choice: a landing is as fast")
 _TIPPED = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a choice: order, direction or propellers")
 _CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
 _STRANDED = LIMITS.add("probability of what could not rise", 0.0, "", "it says that the run failed, and nothing of why")
@@ -80,7 +83,7 @@ def _what(flight: Flight, steered: str) -> str:
         return "it flew into the ground as steered"
     if flight.struck_s is not None:
         return "it hit something"
-    return "it crashed" if flight.hit is None else f"it hit the ground at {flight.hit.speed_ms:.1f} m/s"
+    return "it crashed" if flight.hit is None else f"it hit {flight.hit.what} at {flight.hit.speed_ms:.1f} m/s"
 
 
 def _stranded(flight: Flight) -> Iterator[Finding]:
@@ -121,8 +124,8 @@ def _tipped(flight: Flight, at: float) -> bool:
 def _steered(flight: Flight, at: float) -> str:
     """What shows that it went down as told: the attitude was followed, and the pilot's throttle stick was at its
     bottom."""
-    mode = flight.mode_at(at - 2.0)
-    by_stick = mode is not None and mode.way in ("manual", "hold")
+    mode = flight.mode_at(at - _ANSWERS_S)
+    by_stick = mode is not None and mode.way in ("manual", "hold") and not _fell_before(flight, mode.start_s, at)
     if not by_stick or (flight.lost_control_s is not None and flight.lost_control_s < at - 1.0):
         return ""
     sticks = flight.one("RCIN", "C3")
@@ -131,6 +134,14 @@ def _steered(flight: Flight, at: float) -> str:
     stick = sticks["C3"][(sticks.t > at - 8.0) & (sticks.t <= at - 1.0)]
     low = len(stick) > 2 and float(np.max(stick)) < _STICK_LOW and float(np.min(stick)) > _STICK_LEAST
     return "the throttle stick was at its bottom and the attitude followed its demand" if low else ""
+
+
+def _fell_before(flight: Flight, since_s: float, at: float) -> bool:
+    """Whether it came down already as the mode began in which it hit the ground: then its stick did not bring it
+    down."""
+    if flight.height is None or at - since_s > _FALL_S:
+        return at - since_s < _FALL_S
+    return float(np.interp(since_s - 1.0, *flight.height) - np.interp(since_s, *flight.height)) > _SINKS_M
 
 
 CHECK = Check("crash", "a crash, or a tip-over at take-off", READS, LIMITS, find)

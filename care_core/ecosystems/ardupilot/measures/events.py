@@ -118,7 +118,7 @@ def crash_of(mission: Mission) -> str:
     if has_event(mission, "crash"):
         return "the autopilot reported a crash"
     if (hit := hit_of(mission)) is not None:
-        return f"it hit the ground at {hit.speed_ms:.1f} m/s"
+        return f"it hit {hit.what} at {hit.speed_ms:.1f} m/s"
     impact_s = flight_of(mission).impact_s
     is_own = impact_s is not None and mission.start_s <= impact_s <= mission.end_s + SAID_AFTER_S
     return "control was lost, and it came down" if is_own else ""
