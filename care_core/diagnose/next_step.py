@@ -61,9 +61,7 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
         return f"{undone}, then try it {trial(run)}" if upset else undone
     named = _named(diagnosis) if has_failed else ()
     if has_failed and upset:
-        symptoms = {one.title for one in findings if one.kind in SYMPTOMS}
-        to_check = [name for name in named if name not in symptoms]
-        return f"check on the bench: {listed(to_check)}; then try it {trial(run)}" if to_check else bench(run)
+        return _checked(named, findings, run)
     if named:
         return f"look at what this names: {listed(named)}"
     if has_failed and diagnosis.tell_more:
@@ -73,6 +71,17 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
     if run.log.format == MAVLINK_TLOG.name and run.log.facts.get("stack") == "PX4":
         return "triage the .ulg that the vehicle itself wrote: profile px4 reads it, and telemetry holds little of it"
     return "'care inspect LOG' tells what each profile would need"
+
+
+def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str:
+    """What to check before what was upset is tried again: no motor is to blame for what the vehicle estimated wrongly,
+    though nothing says why it did."""
+    symptoms = {one.title: one.kind for one in findings if one.kind in SYMPTOMS}
+    parts = [name for name in named if name not in symptoms]
+    if parts:
+        return f"check on the bench: {listed(parts)}; then try it {trial(run)}"
+    misled = [name for name in named if symptoms[name] not in UPSETS]
+    return f"look at what this names: {listed(misled)}; then try it {trial(run)}" if misled else bench(run)
 
 
 def _of_fix(fix: Fix, diagnosis: Diagnosis, *, upset: bool) -> str:

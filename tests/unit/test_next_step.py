@@ -75,6 +75,13 @@ def test_what_drives_is_tried_at_walking_pace() -> None:
     assert "propellers" in bench(run)
 
 
+def test_no_motor_is_checked_for_a_height_that_was_estimated_wrongly() -> None:
+    height = Finding("estimator", "the estimated height runs away", 40.0, 60.0, "critical", "", "", probability=0.9)
+    named = replace(failed(height, THRUST), hypotheses=(Hypothesis("hardware", height.title, 0.9),))
+    said = next_step(replace(named, health=Health("", (), (replace(height, followed_by=(THRUST,)),))), has_failed=True)
+    assert said.startswith("look at what this names: the estimated height runs away; then try it in the simulator")
+
+
 def test_a_symptom_is_no_part_to_check() -> None:
     lost = Finding("attitude", "control was lost", 50.0, 60.0, "critical", "", "", probability=0.3)
     named = replace(failed(lost), hypotheses=(Hypothesis("hardware", lost.title, 0.7), Hypothesis("chance", "", 0.3)))
