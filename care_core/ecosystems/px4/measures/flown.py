@@ -18,6 +18,7 @@ from care_core.ecosystems.px4.measures.requested import (
     PLACES,
     RETURN,
     Item,
+    end_of,
     home_of,
     items_begun,
     items_in_all,
@@ -125,7 +126,7 @@ def analyse(mission: Mission) -> FlownMission:
     way = mission.shared(requested_mission)
     ending = "open" if isinstance(way, Unavailable) else way.ending
     corners = np.empty((0, 2)) if isinstance(way, Unavailable) else way.points[:, :2]
-    end = None
+    end = end_of(mission) if isinstance(way, Unavailable) else None
     if ending != "open":
         end = (0.0, 0.0) if ending == "return" else (float(corners[-1, 0]), float(corners[-1, 1]))
     reached = _reached(mission)

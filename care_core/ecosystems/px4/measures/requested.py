@@ -122,6 +122,8 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     if isinstance(items, Unavailable):
         return items
     assert home is not None
+    if _lands_under_way(items):
+        return Unavailable("the mission lands on its way and takes off again")
     points, holds, speeds = [(0.0, 0.0, 0.0)], [], []
     ending: Ending = "open"
     for number in sorted(items):
@@ -142,6 +144,26 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     if len(points) < 2:
         return Unavailable("no waypoint of the mission was begun")
     return RequestedMission(np.array(points), np.array(holds), np.array(speeds), ending)
+
+
+def _lands_under_way(items: Mapping[int, Item]) -> bool:
+    """Whether a landing is followed by another take-off: that is more than one flight, and takes longer than its legs
+    say."""
+    landed = [number for number, item in items.items() if item.command == LAND]
+    return bool(landed) and any(n > min(landed) and item.command in (TAKEOFF, *PLACES) for n, item in items.items())
+
+
+def end_of(mission: Mission) -> tuple[float, float] | None:
+    """Where the landing or return that is behind all other places ends, in metres north and east of home; None where
+    none was begun."""
+    items, home = mission.shared(items_begun), home_of(mission)
+    if isinstance(items, Unavailable) or home is None:
+        return None
+    leading = {number: item for number, item in items.items() if item.command in (TAKEOFF, LAND, RETURN, *PLACES)}
+    last = leading[max(leading)] if leading else None
+    if last is None or last.command not in (LAND, RETURN):
+        return None
+    return (0.0, 0.0) if last.command == RETURN else home.offset(last.lat, last.lon)
 
 
 def _speed(mission: Mission, begun_s: float) -> float:

@@ -135,5 +135,6 @@ def path_error(mission: Mission, args: Args) -> Value:
     if isinstance(flown, Unavailable):
         return flown
     if flown.track is None or not len(flown.corners):
-        return missing(POSITION if flown.track is None else ITEM)
+        given = mission.shared(requested_mission)
+        return missing(POSITION) if flown.track is None else given if isinstance(given, Unavailable) else missing(ITEM)
     return statistic(flown.path_errors(), str(args.get("stat", "max")))
