@@ -39,7 +39,7 @@ from care_core.diagnose.estimates import (
     USED_UP,
 )
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, Key, NoisyOr, What
-from care_core.diagnose.parts import OUTLASTED, is_late, set_wrong, was_refused
+from care_core.diagnose.parts import OUTLASTED, is_late, never_flew, set_wrong
 from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.explains import EXPLAINS
@@ -95,7 +95,7 @@ def failure_of(
     before = query.before()
     names = [result.variable.name for result in broken]
     options, chance = _lost_by_options(before, names)
-    if was_refused(findings):
+    if never_flew(findings):
         options = dict.fromkeys(options, 0.0)  # what acts in flight kept no vehicle from arming, and hardly chance
         chance = min(chance, BY_CHANCE_REFUSED.value)
     else:

@@ -8,7 +8,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from care_core.ecosystems.findings import CAME_DOWN, NO_BATTERY, OWN_SUPPLY, UNCHARGED, Finding, every_finding
+from care_core.ecosystems.findings import (
+    CAME_DOWN,
+    NO_BATTERY,
+    NOT_BEGUN,
+    OWN_SUPPLY,
+    UNCHARGED,
+    UNPOWERED,
+    Finding,
+    every_finding,
+)
 from care_core.ecosystems.ranking import LIKELY
 from care_core.text import log_time
 
@@ -27,6 +36,15 @@ _SET_APART = re.compile(r"critical\s*>=|failsafe critical|capacity", re.IGNORECA
 def was_refused(findings: Iterable[Finding]) -> bool:
     """Whether it never armed, by what was found or by what that led to."""
     return any(one.kind == "prearm" for one in every_finding(findings))
+
+
+def never_flew(findings: Iterable[Finding]) -> bool:
+    """Whether it never left the ground, for a reason that no parameter of its flight has: it was refused, its motors
+    got no power, or nothing told it to lift."""
+    found = tuple(every_finding(findings))
+    return was_refused(found) or any(
+        one.title in (NOT_BEGUN, UNPOWERED) and one.severity == "critical" for one in found
+    )
 
 
 def set_wrong(finding: Finding) -> bool:

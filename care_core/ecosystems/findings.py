@@ -137,6 +137,8 @@ OWN_SUPPLY = "the autopilot's own supply"
 """What the title of a finding about the board's voltage, not the pack's, begins with."""
 UNCHARGED = "the battery was not charged"
 BATTERY_FAILSAFE = "battery failsafe"
+UNPOWERED = "the motors draw no power"
+NOT_BEGUN = "its mission never began"
 NO_BATTERY = "the battery monitor measures no battery, and its failsafe acted"
 CAME_DOWN = "it came down and could not rise again"
 

@@ -5,12 +5,67 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from care_core.diagnose.parts import never_flew
+from care_core.ecosystems.findings import NOT_BEGUN, UNPOWERED, Finding, every_finding
+from care_core.ecosystems.px4.examining import examine
+from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.logs.base import Table
 from care_core.run import Unavailable
+from tests.unit.test_px4_health import MadeLog, states
 from tests.unit.test_px4_measures import BEGUN_S, item, mission, table, value
 
 TAKEOFF, PLACE, LAND, RETURN = 22, 16, 21, 20
 FIELDS = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude", "time_inside", "altitude_is_relative")
+
+
+def found(**topics: Table) -> tuple[Finding, ...]:
+    return tuple(every_finding(examine(Px4Flight(MadeLog(dict(topics)))).findings))
+
+
+def on_ground(amps: float, *, last_mode: float = 3.0) -> tuple[Finding, ...]:
+    """A flight that asks for all the thrust from 20 s on and stays where it is, its battery giving so much."""
+    battery = states(voltage_v=[(0, 12.0)], current_a=[(0, 0.05), (20, amps)])
+    return found(
+        vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 3), (45, last_mode)],
+                              failsafe=[(0, 0)]),
+        vehicle_local_position=states(z=[(0, 0.0)], vz=[(0, 0.0)]),
+        vehicle_local_position_setpoint=states(vz=[(0, 0.0), (20, -1.5)]),
+        vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, 0.0), (20, -1.0)]}),
+        battery_status=battery,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("amps", "title"), [(0.2, UNPOWERED), (12.0, "too little thrust")])
+def test_what_draws_hardly_any_power_has_none_at_its_motors(amps: float, title: str) -> None:
+    thrust = [one for one in on_ground(amps) if one.kind == "thrust"]
+    assert [one.title for one in thrust] == [title]
+    assert never_flew(thrust) == (title == UNPOWERED)
+
+
+def test_a_bench_run_that_somebody_broke_off_did_not_fail() -> None:
+    (one,) = [one for one in on_ground(0.2, last_mode=0.0) if one.kind == "thrust"]
+    assert (one.title, one.severity) == (UNPOWERED, "warning")
+    assert not never_flew([one])
+
+
+def test_a_current_that_is_not_measured_tells_of_no_power() -> None:
+    assert [one.title for one in on_ground(0.05) if one.kind == "thrust"] == ["too little thrust"]
+
+
+@pytest.mark.parametrize(
+    ("mode", "thrust", "is_told"), [(3.0, 0.0, True), (3.0, -0.5, False), (2.0, 0.0, False)]
+)  # fmt: skip
+def test_a_mission_that_asks_nothing_of_the_motors_never_began(mode: float, thrust: float, is_told: bool) -> None:
+    titles = [
+        one.title
+        for one in found(
+            vehicle_status=states(arming_state=[(0, 1), (10, 2), (20, 1)], nav_state=[(0, mode)], failsafe=[(0, 0)]),
+            vehicle_land_detected=states(landed=[(0, 1)]),
+            vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, thrust)]}),
+            mission_result=states(finished=[(0, 1)], seq_reached=[(0, -1)], seq_total=[(0, 5)]),
+        )
+    ]
+    assert (NOT_BEGUN in titles) == is_told
 
 
 def landing_on_the_way() -> Table:

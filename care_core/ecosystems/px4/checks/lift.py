@@ -1,5 +1,8 @@
 """Thrust at its end that does not give the vertical speed that is wanted: too little lift, or lift that nothing ends.
 
+Where the battery gives hardly any power although lift is asked for, no propeller turns: on a bench, or because
+the motors get none.
+
 The position controller asks for a vertical speed (vehicle_local_position_setpoint.vz) and, for it, for thrust between
 MPC_THR_MIN and MPC_THR_MAX. What is at that end and still far off cannot be held by any gain.
 """
@@ -12,12 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import UNPOWERED, Finding
 from care_core.ecosystems.px4.flight import POSITION, Px4Flight, Span
+from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
 from care_core.numbers import Floats, median
 from care_core.records import replace
 
+_BATTERY = "battery_status"
 _WANTED, _AIR = "vehicle_local_position_setpoint", "vehicle_air_data"
 _THRUST, _OLD_THRUST = "vehicle_thrust_setpoint", "vehicle_attitude_setpoint"
 READS: Wanted = {
@@ -26,6 +31,7 @@ READS: Wanted = {
     _AIR: ("baro_alt_meter",),
     _THRUST: ("xyz[2]",),
     _OLD_THRUST: ("thrust_body[2]",),
+    _BATTERY: ("voltage_v", "current_a"),
 }
 
 LIMITS = Limits()
@@ -37,6 +43,11 @@ _HEARD = LIMITS.add("share of it that the barometer tells, too", 0.5, "", "a cho
 _ALL = LIMITS.add("thrust of all that there is", 0.98, "", "MPC_THR_MAX is 1 as shipped")
 _LEAST = LIMITS.add("least thrust", 0.12, "", "MPC_THR_MIN as shipped")
 _NEAR_LEAST = LIMITS.add("thrust near the least", 0.02, "", "a choice: it is rounded")
+_LIFTS = LIMITS.add("thrust that lifts", 0.4, "", "a choice: what hovers with less has power to spare")
+_DRAWS_W = LIMITS.add("power of a vehicle that lifts", 5.0, "W", "the lightest quadcopter, of 30 g, hovers with 7 W")
+_MEASURED_A = LIMITS.add("change of a current that is measured", 0.02, "A", "a choice: what is not measured stays")
+_FEWEST = 10
+_UNPOWERED = LIMITS.add("probability that the motors get no power", 0.95, "", "physics: lift takes power")
 _TRUE = LIMITS.add("probability of a part", 0.5, "", "a choice: a load, and how outputs are set, look the same")
 
 
@@ -59,9 +70,41 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     most, least = flight.parameter("MPC_THR_MAX") or 1.0, flight.parameter("MPC_THR_MIN") or _LEAST
     lacks = (lift > min(_ALL, most - _NEAR_LEAST)) & (sinks - wanted > _OFF_MS) & (wanted < 0.0)
     flies_off = (lift < least + _NEAR_LEAST) & (wanted - sinks > _OFF_MS) & (sinks < -_RISES_MS)
-    yield from _told(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust")
+    lacking = _told(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust")
+    drawn_w = drawn_while_lifting(flight)
+    yield from lacking if drawn_w is None else (_unpowered(flight, one, drawn_w) for one in lacking)
     for one in _told(flight, _End(t, flies_off, sinks, wanted), "it rises with the motors at their least", "the least"):
         yield replace(one, severity="critical" if one.end_s - one.onset_s > _LONG_S else "warning")
+
+
+def drawn_while_lifting(flight: Px4Flight) -> float | None:
+    """The power (W) that the battery gives in the middle while thrust is asked for that lifts, where no multicopter can
+    fly on so little; None where it gives more, or the log does not measure it."""
+    battery, thrust = flight.table(_BATTERY, "voltage_v", "current_a"), _thrust(flight)
+    if battery is None or thrust is None:
+        return None
+    t, amps = battery.t, battery["current_a"]
+    armed = np.logical_or.reduce([(t >= start) & (t <= end) for start, end in flight.armed])
+    measured = armed & (np.interp(t, *thrust) > _LIFTS) & np.isfinite(amps) & (amps >= 0.0)
+    if measured.sum() < _FEWEST or float(np.ptp(amps[np.isfinite(amps)])) < _MEASURED_A:
+        return None
+    power = float(median((amps * battery["voltage_v"])[measured]))
+    return power if power < _DRAWS_W else None
+
+
+def _unpowered(flight: Px4Flight, lacking: Finding, drawn_w: float) -> Finding:
+    """Thrust that does not come because nothing drives the propellers: no failure where somebody broke it off."""
+    span = next(one for one in flight.armed if one[0] <= lacking.onset_s <= one[1])
+    by_hand = way_of("px4", flight.modes_during(span)[-1]) == "manual"
+    return replace(
+        lacking,
+        title=UNPOWERED,
+        severity="warning" if by_hand else "critical",
+        evidence=f"{drawn_w:.1f} W while lift is asked for: no power at their controllers, or no propellers; "
+        + lacking.evidence,
+        source=f"{lacking.source}, {_BATTERY}.current_a",
+        probability=_UNPOWERED,
+    )
 
 
 def _told(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator[Finding]:

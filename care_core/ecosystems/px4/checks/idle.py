@@ -1,0 +1,64 @@
+"""A mission that never began: armed in its mode, on the ground, and nothing was asked of the motors.
+
+The navigator flies no mission that it calls finished, and none that it cannot use; the vehicle then waits on the ground
+until the firmware disarms it (COM_DISARM_PRFLT). No parameter of its flight has to do with that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import NOT_BEGUN, Finding
+from care_core.ecosystems.px4.flight import LANDED, RESULT, Px4Flight, Span
+from care_core.ecosystems.vehicles import way_of
+from care_core.logs.base import Wanted
+
+_THRUST, _OLD_THRUST = "vehicle_thrust_setpoint", "vehicle_attitude_setpoint"
+READS: Wanted = {
+    LANDED: ("landed",),
+    RESULT: ("finished", "seq_reached"),
+    _THRUST: ("xyz[2]",),
+    _OLD_THRUST: ("thrust_body[2]",),
+}
+LIMITS = Limits()
+_IDLES = LIMITS.add("thrust that is asked for on the ground", 0.1, "", "MPC_THR_MIN is 0.12 as shipped")
+_WAITS_S = LIMITS.add("shortest time armed", 3.0, "s", "a choice: COM_SPOOLUP_TIME is 1 s as shipped, and margin")
+_SURE = LIMITS.add("probability that it was not begun", 0.9, "", "nothing was asked of the motors")
+
+
+def find(flight: Px4Flight) -> Iterator[Finding]:
+    """One finding for the first time that it was armed for a mission and lifted nothing."""
+    for span in flight.armed if flight.hovers else ():
+        ways = {way_of("px4", mode) for mode in flight.modes_during(span)}
+        asked = _most_asked(flight, span)
+        stays = flight.during(LANDED, "landed", span) is not None and not flight.ever(LANDED, "landed", 0, span)
+        if ways == {"mission"} and asked is not None and asked < _IDLES and stays and span[1] - span[0] > _WAITS_S:
+            done = flight.ever(RESULT, "finished", 1, span) and not flight.at_least(RESULT, "seq_reached", 0, span)
+            yield Finding(
+                kind="software",
+                title=NOT_BEGUN,
+                onset_s=span[0],
+                end_s=span[1],
+                severity="critical",
+                evidence=f"armed in mode Mission for {span[1] - span[0]:.0f} s on the ground, no thrust was asked for"
+                + ("; the navigator calls the mission finished: upload it again, or start it anew" if done else ""),
+                source=f"{LANDED}, {_THRUST}, {RESULT}",
+                suspect="operation",
+                probability=_SURE,
+            )
+            return
+
+
+def _most_asked(flight: Px4Flight, span: Span) -> float | None:
+    """The most lift (0 to 1) that was asked for in a span; None where the log does not say."""
+    for topic, field in ((_THRUST, "xyz[2]"), (_OLD_THRUST, "thrust_body[2]")):
+        table = flight.during(topic, field, span)
+        if table is not None and np.isfinite(table[field]).any():
+            return float(np.nanmax(-table[field]))
+    return None
+
+
+CHECK = Check("idle", "a mission that never began, though the vehicle was armed for it", READS, LIMITS, find)
