@@ -78,7 +78,7 @@ def landing_on_the_way() -> Table:
 
 def test_a_mission_that_lands_on_its_way_ends_where_it_lands_last() -> None:
     result = [(5.0, -1.0), *((20.0 + 15.0 * n, float(n)) for n in range(6))]
-    rows = [(t, n, 6.0, 0.0, 0.0, 1.0, 1.0) for t, n in result]
+    rows: list[tuple[float, ...]] = [(t, n, 6.0, 0.0, 0.0, 1.0, 1.0) for t, n in result]
     fields = ("seq_reached", "seq_total", "finished", "failure", "mission_id", "instance_count")
     flight = mission(navigator_mission_item=landing_on_the_way(), mission_result=table(rows, *fields))
     assert value("px4_landing_error", flight) == pytest.approx(0.0, abs=1.0)
