@@ -117,3 +117,27 @@ def test_a_mode_that_minds_a_stick_at_its_bottom_brings_a_copter_down(falls_s: f
     made.rows["ERR"] = [(max(lands_s, 61.0), {"Subsys": 12.0, "ECode": 1.0})]
     said = [one.title for one in every_finding(made.find()) if one.kind == "crash"]
     assert ("it flew into the ground as steered" in said) == is_steered
+
+
+def on_a_bench() -> Made:
+    """Motors at 40 % and more for a minute and a half, one far above the others, and nothing moves."""
+    made = Made()
+    for name, field in HEIGHTS:
+        made.table[name][field][:] = made.noise(0.1)
+    for field in ("Roll", "Pitch", "DesRoll", "DesPitch"):
+        made.table["ATT"][field][:] = made.noise(0.05)
+    made.table["RCOU"]["C2"][made.after(UP_S, DOWN_S)] += 300.0
+    return made
+
+
+def test_motors_of_what_does_not_stir_are_not_compared() -> None:
+    bench = on_a_bench()
+    said = titles(bench)
+    assert "its motors were driven, and it did not stir" in said
+    assert not [title for title in said if "motor 2" in title]
+    bench.table["ATT"]["Roll"] += np.where(bench.after(20.0, 22.0), 8.0, 0.0)
+    assert "its motors were driven, and it did not stir" not in titles(bench)
+
+
+def test_what_flies_stirs() -> None:
+    assert "its motors were driven, and it did not stir" not in titles(Made())

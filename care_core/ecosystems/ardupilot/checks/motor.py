@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems import lost_motor
+from care_core.ecosystems.ardupilot.checks import bench
 from care_core.ecosystems.ardupilot.checks.thrust import climbs, saturated
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
@@ -125,7 +126,7 @@ class _Outputs(Record, eq=False):
 def find(flight: Flight) -> Iterator[Finding]:
     """The motor that does not give what is asked of it, by the strongest evidence."""
     outputs = _outputs(flight)
-    if outputs is None:
+    if outputs is None or bench.unmoved(flight) is not None:
         return
     for test in (_stopped, _fell_towards, _driven_hardest, _weak, _reported):
         found = next(iter(test(flight, outputs)), None)
