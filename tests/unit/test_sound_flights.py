@@ -141,3 +141,15 @@ def test_motors_of_what_does_not_stir_are_not_compared() -> None:
 
 def test_what_flies_stirs() -> None:
     assert "its motors were driven, and it did not stir" not in titles(Made())
+
+
+def test_what_nobody_asked_to_arm_was_not_refused() -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    for name, field in HEIGHTS:
+        made.table[name][field][:] = 0.0
+    made.rows["MSG"] = [(20.0, {"Message": "PreArm: RC not found"})]
+    assert "arming would be refused: RC not found" in titles(made)
+    made.rows["MSG"] = [(20.0, {"Message": "Arm: RC not found"})]
+    assert "arming was refused: RC not found" in titles(made)

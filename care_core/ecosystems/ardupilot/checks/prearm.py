@@ -52,7 +52,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     complaints = tuple(dict.fromkeys(one.plain for one in lasting))
     finding = Finding(
         kind="prearm",
-        title=f"arming was refused: {why}",
+        title=f"arming {'was' if asked else 'would be'} refused: {why}",
         onset_s=begin,
         end_s=lasting[-1].time_s,
         severity=severity,
