@@ -153,3 +153,13 @@ def test_what_nobody_asked_to_arm_was_not_refused() -> None:
     assert "arming would be refused: RC not found" in titles(made)
     made.rows["MSG"] = [(20.0, {"Message": "Arm: RC not found"})]
     assert "arming was refused: RC not found" in titles(made)
+
+
+@pytest.mark.parametrize(("throttle", "is_told"), [(0.0, False), (0.4, True)])
+def test_a_rover_that_never_drove_loses_no_fix_on_its_way(throttle: float, is_told: bool) -> None:
+    made = Made()
+    made.facts = {"firmware": "ArduRover V4.5.4"}
+    made.rows["MODE"] = [(0.0, {"ModeNum": 0.0})]
+    made.table["CTUN"]["ThO"][:] = throttle
+    made.table["GPS"]["Status"][made.after(40.0, 60.0)] = 2.0
+    assert ("the GPS fix was lost on the way" in titles(made)) == is_told

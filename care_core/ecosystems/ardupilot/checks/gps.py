@@ -63,6 +63,7 @@ _LOST = LIMITS.add(
     "probability that few satellites cost the mission", 0.15, "",
     "4 of 11 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
 )  # fmt: skip
+_DRIVES = LIMITS.add("throttle that drives", 0.02, "", "a choice: what idles has less")
 _NO_FIX = LIMITS.add("probability of a lost fix", 0.9, "", "the receiver's own word")
 _GLITCHED = LIMITS.add("probability of a reported glitch", 0.6, "", "a choice: the firmware's word, without the size")
 _DOUBTS = LIMITS.add("probability where it is only inaccurate", 0.4, "", "a choice: buildings and trees do that")
@@ -167,7 +168,9 @@ def _in(spans: tuple[Span, ...], t: float) -> bool:
 
 
 def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
-    """A fix that went away in the air."""
+    """A fix that went away in the air, or of what drove: a vehicle that stands under a roof has nowhere to go."""
+    if not flies(flight.kind) and not _drove(flight):
+        return
     had = np.cumsum(table["Status"] >= _FIX) > 0
     out = lasting(table.t, had & (table["Status"] < _FIX) & during(flight.flown, table.t), _NO_FIX_S, records=2)
     if out:
@@ -184,6 +187,14 @@ def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
             source="GPS.Status below 3",
             probability=_NO_FIX,
         )
+
+
+def _drove(flight: Flight) -> bool:
+    """Whether its throttle ever left its middle while it was armed; where none is recorded, it may have."""
+    if flight.throttle is None:
+        return True
+    t, throttle = flight.throttle
+    return bool(np.any(np.abs(throttle[during(flight.armed, t)]) > _DRIVES))
 
 
 def _few(flight: Flight, table: Table) -> Iterator[Finding]:
