@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.ardupilot.measures.outcome import plain_checks
 from care_core.ecosystems.findings import NO_BATTERY, every_finding
+from care_core.ecosystems.measures import Mission
 from care_core.run import Setting
 from tests.flights import DOWN_S, END_S, UP_S, Made, flight_of
 
@@ -163,3 +165,13 @@ def test_a_rover_that_never_drove_loses_no_fix_on_its_way(throttle: float, is_to
     made.table["CTUN"]["ThO"][:] = throttle
     made.table["GPS"]["Status"][made.after(40.0, 60.0)] = 2.0
     assert ("the GPS fix was lost on the way" in titles(made)) == is_told
+
+
+@pytest.mark.parametrize(("firmware", "value"), [("ArduSub V4.5.6", 1.0), ("ArduRover V4.5.4", 1.0)])
+def test_a_disarming_by_force_harms_nothing_that_cannot_fall(firmware: str, value: float) -> None:
+    made = Made()
+    made.facts = {"firmware": firmware}
+    made.rows["MODE"] = [(0.0, {"ModeNum": 0.0})]
+    made.rows["ARM"][-1][1]["Forced"] = 1.0
+    mission = Mission(made.flight(), made.tables(), 5.0, DOWN_S + 5.0, True, {})
+    assert {one.name: one.value for one in plain_checks(mission)}["disarmed"] == value

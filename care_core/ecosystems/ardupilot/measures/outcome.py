@@ -88,6 +88,7 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Che
         done = _mission_done(mission)
         yield Check("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
     silent: Value = lost_events(mission) or 1.0
+    landed: Value = 1.0  # what does not fly comes to no harm by it
     no_crash = 0.0 if crashed else silent
     how = event_clause(mission, "crash") or crash
     yield Check("no_crash", no_crash, "the autopilot reported no crash, and none shows", how)
@@ -98,7 +99,7 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Che
         yield Check("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
     elif done == 1.0 and not mission.ended:
         return  # what stands on the ground when all is done comes to no harm by staying armed
-    at_end: Value = 1.0 - forced(mission) if mission.ended else CUT
+    at_end: Value = float(landed == 1.0 or not forced(mission)) if mission.ended else CUT
     if mission.ended and not flight_of(mission).arm_changes:
         at_end = UNRECORDED
     yield Check("disarmed", at_end, "it was disarmed, and not by force in flight", "it was disarmed by force")
