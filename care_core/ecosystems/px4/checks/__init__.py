@@ -5,6 +5,7 @@ from __future__ import annotations
 from care_core.ecosystems.base import Check
 from care_core.ecosystems.px4.checks import (
     arming,
+    attitude,
     barometer,
     battery,
     blocked,
@@ -32,6 +33,7 @@ CHECKS: tuple[Check[Px4Flight], ...] = (
     barometer.CHECK,
     battery.CHECK,
     changes.CHECK,
+    attitude.CHECK,
     crash.CHECK,
     blocked.CHECK,
     errors.CHECK,
