@@ -92,14 +92,18 @@ def test_a_mission_that_lands_on_its_way_ends_where_it_lands_last() -> None:
 def leaning(*degrees: tuple[float, float]) -> list[str]:
     """Findings of the attitude of a hover that was to be level, and leant so far from given times on."""
     half = [(t, np.radians(lean) / 2) for t, lean in ((0.0, 0.0), *degrees)]
-    level = {"q_d[0]": [(0, 1.0)], **{f"q_d[{n}]": [(0, 0.0)] for n in (1, 2, 3)}}
+    roll: dict[str, list[tuple[float, float]]] = {
+        "q[0]": [(t, float(np.cos(a))) for t, a in half], "q[1]": [(t, float(np.sin(a))) for t, a in half],
+        "q[2]": [(0, 0.0)], "q[3]": [(0, 0.0)],
+    }  # fmt: skip
+    level: dict[str, list[tuple[float, float]]] = {"q_d[0]": [(0, 1.0)]}
+    level |= {f"q_d[{n}]": [(0, 0.0)] for n in (1, 2, 3)}
     findings = found(
         vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 2)], failsafe=[(0, 0)],
                               vehicle_type=[(0, 1)]),
         vehicle_land_detected=states(landed=[(0, 1), (12, 0), (48, 1)]),
         vehicle_local_position=states(z=[(0, 0.0), (13, -10.0), (47, 0.0)], vz=[(0, 0.0)]),
-        vehicle_attitude=states(**{"q[0]": [(t, np.cos(a)) for t, a in half], "q[1]": [(t, np.sin(a)) for t, a in half],
-                                   "q[2]": [(0, 0.0)], "q[3]": [(0, 0.0)]}),
+        vehicle_attitude=states(**roll),
         vehicle_attitude_setpoint=states(**level),
     )  # fmt: skip
     return [one.title for one in findings if one.kind == "attitude"]
