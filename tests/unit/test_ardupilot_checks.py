@@ -757,6 +757,15 @@ def test_a_barometer_that_drifts_from_the_range_finder_on_the_ground_is_noted(dr
     assert all(one.severity == "info" for one in found)
 
 
+@pytest.mark.parametrize(("felt", "is_told"), [(9.8, False), (9.2, False), (7.8, True)])
+def test_accelerometers_that_do_not_feel_gravity_at_rest_are_told(felt: float, is_told: bool) -> None:
+    made = Made()
+    for name in ("IMU", "IMU#2"):
+        made.table[name]["AccZ"] += 9.8 - felt
+    titles = [one.title for one in every_finding(made.find())]
+    assert ("the accelerometers do not feel gravity at rest" in titles) == is_told
+
+
 def test_gyros_that_turn_fast_differ_by_their_scale_and_are_not_noisy() -> None:
     made = Made()
     flips = made.after(FAILS_S, FAILS_S + 30)

@@ -26,8 +26,10 @@ _APART_M = LIMITS.add("estimate off the barometer", 5.0, "m", "five times what a
 _LASTS_S = LIMITS.add("shortest time of it", 5.0, "s", "a choice: a descent through its own wash is over sooner")
 _GRAVITY = LIMITS.add("gravity", 9.81, "m/s^2", "physics")
 _OFF = LIMITS.add("gravity off, at rest", 0.5, "m/s^2", "a choice: a calibrated accelerometer is within 0.1")
+_FAR_OFF = LIMITS.add("gravity far off, at rest", 1.0, "m/s^2", "MPU-6000, not calibrated: 0.8 on one axis")
 _REST = LIMITS.add("throttle at rest", 0.05, "", "a choice: motors that idle shake little")
 _TRUE = LIMITS.add("probability that it is so", 0.8, "", "a choice: both are measured; which one is wrong is not")
+_LOST = LIMITS.add("probability that it costs the mission", 0.4, "", "a choice: the barometer corrects most of it")
 _SOURCES = (("EK3_SRC1_POSZ", 1.0), ("EK3_ALT_SOURCE", 0.0), ("EK2_ALT_SOURCE", 0.0))
 """The value with which the height is that of the barometer."""
 _HELD = frozenset(("hold", "mission", "return", "land", "guided"))
@@ -47,6 +49,26 @@ def find(flight: Flight) -> Iterator[Finding]:
         if found is not None:
             yield found
             return
+    yield from _not_gravity(flight)
+
+
+def _not_gravity(flight: Flight) -> Iterator[Finding]:
+    """Accelerometers that are far off gravity at rest: every climb rate that is estimated from them is wrong, though
+    the barometer holds the height within its limit."""
+    felt = _felt_at_rest(flight)
+    if felt is not None and abs(felt - _GRAVITY) > _FAR_OFF:
+        yield Finding(
+            kind="imu",
+            title="the accelerometers do not feel gravity at rest",
+            onset_s=flight.armed[0][0],
+            end_s=flight.end_s,
+            severity="warning",
+            evidence=f"{felt:.1f} m/s^2 before take-off, gravity is {_GRAVITY:g} (limit {_FAR_OFF:g} off): calibrate "
+            "them",
+            source="IMU.AccX, AccY, AccZ before the throttle is raised",
+            probability=_TRUE,
+            mission_lost=_LOST,
+        )
 
 
 def _parted(flight: Flight, estimate: tuple[Floats, Floats], heard: tuple[Floats, Floats]) -> Finding | None:
@@ -102,17 +124,22 @@ def _holds_height(flight: Flight, start: float, end: float) -> bool:
 
 def _at_rest(flight: Flight) -> str:
     """That the accelerometers do not feel gravity before take-off, in a clause; empty where they do."""
+    felt = _felt_at_rest(flight)
+    if felt is None or abs(felt - _GRAVITY) < _OFF:
+        return ""
+    return f"; at rest the accelerometers feel {felt:.1f} m/s^2, gravity is {_GRAVITY:g}: calibrate them"
+
+
+def _felt_at_rest(flight: Flight) -> float | None:
+    """What the accelerometers feel before the throttle is raised, m/s^2; None where too little is recorded of that."""
     table, driven = flight.one("IMU", "AccX", "AccY", "AccZ"), flight.throttle
     if table is None or driven is None:
-        return ""
+        return None
     lifted = driven[0][driven[1] > _REST]
     still = table.t < (lifted[0] if len(lifted) else np.inf)
     if still.sum() < _FEWEST:
-        return ""
-    felt = float(median(np.sqrt(sum(table[axis][still] ** 2 for axis in ("AccX", "AccY", "AccZ")))))
-    if abs(felt - _GRAVITY) < _OFF:
-        return ""
-    return f"; at rest the accelerometers feel {felt:.1f} m/s^2, gravity is {_GRAVITY:g}: calibrate them"
+        return None
+    return float(median(np.sqrt(sum(table[axis][still] ** 2 for axis in ("AccX", "AccY", "AccZ")))))
 
 
 CHECK = Check("height", "an estimated height that runs away from the barometer's", READS, LIMITS, find)
