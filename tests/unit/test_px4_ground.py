@@ -114,3 +114,17 @@ def test_an_attitude_that_left_its_demand_and_came_back_is_told() -> None:
     assert leaning((25.0, 90.0), (25.6, 0.0), (26.0, -70.0), (26.6, 0.0)) == [off]
     assert leaning((25.0, 40.0), (25.4, 0.0), (40.0, 40.0), (40.4, 0.0)) == []  # flicks of a stick
     assert leaning((25.0, 90.0)) == ["control was lost"]
+
+
+@pytest.mark.parametrize(
+    ("landed", "speed", "said"), [(0, 7.0, "coming down at 7.0 m/s"), (0, 0.2, "armed 10 m up at"), (1, 0.2, "")]
+)
+def test_a_log_that_ends_in_the_air_is_told(landed: int, speed: float, said: str) -> None:
+    findings = found(
+        vehicle_status=states(arming_state=[(0, 1), (10, 2)], nav_state=[(0, 2)], failsafe=[(0, 0)]),
+        vehicle_land_detected=states(landed=[(0, 1), (12, landed)]),
+        vehicle_local_position=states(z=[(0, 0.0), (13, -10.0)], vz=[(0, 0.0), (59, speed)]),
+    )
+    told = [one.evidence for one in findings if one.title == "the log ends in the air"]
+    assert bool(told) == bool(said)
+    assert all(said in one for one in told)

@@ -17,6 +17,7 @@ from care_core.ecosystems.px4.checks import (
     idle,
     kill_switch,
     lift,
+    log,
     motor,
     recorded,
     vibration,
@@ -40,4 +41,5 @@ CHECKS: tuple[Check[Px4Flight], ...] = (
     recorded.CHECK,
     kill_switch.CHECK,
     arming.CHECK,
+    log.CHECK,
 )
