@@ -10,7 +10,7 @@ from care_core.ecosystems.findings import NOT_BEGUN, UNPOWERED, Finding, every_f
 from care_core.ecosystems.px4.examining import examine
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.logs.base import Table
-from care_core.run import Unavailable
+from care_core.run import Setting, Unavailable
 from tests.unit.test_px4_health import MadeLog, states
 from tests.unit.test_px4_measures import BEGUN_S, item, mission, table, value
 
@@ -128,3 +128,23 @@ def test_a_log_that_ends_in_the_air_is_told(landed: int, speed: float, said: str
     told = [one.evidence for one in findings if one.title == "the log ends in the air"]
     assert bool(told) == bool(said)
     assert all(said in one for one in told)
+
+
+@pytest.mark.parametrize(
+    ("pair", "others", "is_told"), [(0.93, 0.54, True), (0.6, 0.3, False), (0.85, 0.8, False)]
+)  # fmt: skip
+def test_motors_that_turn_one_way_and_work_much_harder_are_told(pair: float, others: float, is_told: bool) -> None:
+    spins = {"CA_ROTOR_COUNT": 4.0, **{f"CA_ROTOR{n}_KM": 0.05 if n < 2 else -0.05 for n in range(4)}}
+    asked = {f"control[{n}]": [(0.0, 0.0), (12.0, others if n < 2 else pair), (48.0, 0.0)] for n in range(4)}
+    log = MadeLog(
+        {
+            "vehicle_status": states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 2)], failsafe=[(0, 0)],
+                                     vehicle_type=[(0, 1)]),
+            "vehicle_land_detected": states(landed=[(0, 1), (12, 0), (48, 1)]),
+            "vehicle_local_position": states(z=[(0, 0.0), (13, -10.0), (47, 0.0)], vz=[(0, 0.0)]),
+            "actuator_motors": states(**asked),
+        },
+        parameters={name: (Setting(name, value, "PARM"),) for name, value in spins.items()},
+    )  # fmt: skip
+    titles = [one.title for one in every_finding(examine(Px4Flight(log)).findings)]
+    assert ("motors 3 and 4 work harder than those that turn the other way" in titles) == is_told

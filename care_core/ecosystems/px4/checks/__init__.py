@@ -20,6 +20,7 @@ from care_core.ecosystems.px4.checks import (
     log,
     motor,
     recorded,
+    twist,
     vibration,
 )
 from care_core.ecosystems.px4.flight import Px4Flight
@@ -28,6 +29,7 @@ CHECKS: tuple[Check[Px4Flight], ...] = (
     flags.CHECK,
     estimator.CHECK,
     motor.CHECK,
+    twist.CHECK,
     lift.CHECK,
     idle.CHECK,
     vibration.CHECK,
