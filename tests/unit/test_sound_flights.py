@@ -175,3 +175,13 @@ def test_a_disarming_by_force_harms_nothing_that_cannot_fall(firmware: str, valu
     made.rows["ARM"][-1][1]["Forced"] = 1.0
     mission = Mission(made.flight(), made.tables(), 5.0, DOWN_S + 5.0, True, {})
     assert {one.name: one.value for one in plain_checks(mission)}["disarmed"] == value
+
+
+@pytest.mark.parametrize(("lean", "is_told"), [(60.0, False), (10.0, True)])
+def test_what_lies_on_an_arm_is_shaken_by_the_ground(lean: float, is_told: bool) -> None:
+    made = Made()
+    late = made.after(DOWN_S - 1.0, DOWN_S + 4.0)
+    made.table["ATT"]["Roll"][late] = lean
+    made.table["ATT"]["DesRoll"][late] = lean
+    made.table["VIBE"]["VibeX"][late] = 45.0
+    assert any("vibration" in title for title in titles(made)) == is_told

@@ -11,8 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
 from care_core.ecosystems.ardupilot.statistics import (
     calibrated,
     calibrated_probability,
@@ -58,6 +59,7 @@ _UPSET_S = LIMITS.add("shortest rejection by the estimator", 1.0, "s", "a choice
 _RAW = LIMITS.add("leap of an acceleration, without VIBE", 5.0, "m/s^2", "ArduPilot's advice for logs without VIBE")
 _RAW_SEVERE = LIMITS.add("critical leap of an acceleration", 15.0, "m/s^2", "a choice: three times that")
 _LEVEL_DEG = LIMITS.add("lean at which accelerations are looked at", 15.0, "deg", "a choice: a lean changes them")
+_LIES_DEG = LIMITS.add("lean of what lies on the ground", 45.0, "deg", "ANGLE_MAX is 30 to 45 as shipped")
 _CALIBRATION = calibrated(
     LIMITS,
     ((0.5, 0.5), (1.0, 0.9), (2.0, 0.97)),
@@ -87,6 +89,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
         calm &= during(((start + _SPIN_UP_S, end - _SPIN_UP_S) for start, end in flight.flown), table.t)
     if (struck_s := flight.struck_s) is not None:  # what it hit shakes it
         calm &= table.t < struck_s
+    calm &= ~_scrapes(flight, table.t)
     t = table.t[calm]
     if len(t) < 3:
         return None
@@ -117,6 +120,13 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
         source=_SOURCE,
         probability=calibrated_probability(max(peak / HIGH, 1.0 if clips >= _CLIPS else 0.0), _CALIBRATION),
     )
+
+
+def _scrapes(flight: Flight, t: Floats) -> Mask:
+    """When a copter leans so far, so low, that an arm of it is on the ground: that shakes it, and is no vibration."""
+    if not flight.is_copter or flight.tilt is None or flight.height is None:
+        return np.zeros(len(t), dtype=bool)
+    return np.asarray((np.interp(t, *flight.tilt) > _LIES_DEG) & (np.interp(t, *flight.height) < AIRBORNE_M))
 
 
 def _against(peak: float) -> str:
