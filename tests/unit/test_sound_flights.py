@@ -185,3 +185,11 @@ def test_what_lies_on_an_arm_is_shaken_by_the_ground(lean: float, is_told: bool)
     made.table["ATT"]["DesRoll"][late] = lean
     made.table["VIBE"]["VibeX"][late] = 45.0
     assert any("vibration" in title for title in titles(made)) == is_told
+
+
+@pytest.mark.parametrize(("speed", "is_told"), [(30.0, False), (8.0, True)])
+def test_the_outputs_of_what_flies_very_fast_show_no_weak_motor(speed: float, is_told: bool) -> None:
+    made = Made()
+    made.table["RCOU"]["C2"][made.after(50.0, DOWN_S)] += 300.0
+    made.table["GPS"]["Spd"][made.after(49.0, DOWN_S)] = speed
+    assert any("motor 2" in title for title in titles(made)) == is_told

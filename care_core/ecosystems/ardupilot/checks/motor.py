@@ -65,6 +65,7 @@ _TRYING_S = LIMITS.add("first seconds of trying to lift", 12.0, "s", "a choice: 
 _LIFTING = LIMITS.add("output that lifts", 0.2, "of the range", "a choice: armed motors idle below it")
 _TRIES = LIMITS.add("throttle that tries to lift", 0.1, "of the range", "a choice: MOT_SPIN_MIN is 0.15 as shipped")
 _HOVERS_MS = LIMITS.add("speed at which a QuadPlane hovers", 6.0, "m/s", "a choice: faster, its wing lifts part of it")
+_FAST_MS = LIMITS.add("speed at which a copter is far from hovering", 20.0, "m/s", "WPNAV_SPEED: 20 at most")
 _UPRIGHT_DEG = LIMITS.add("lean of what still flies", 60.0, "deg", "a choice: beyond it motors are told to right it")
 _CALM_DEG = LIMITS.add("attitude error before control was lost", 12.0, "deg", "a choice: what drifts off lost no motor")
 _TIPS_DEG = LIMITS.add("lean off the demand towards a motor", 10.0, "deg", "a choice: less points nowhere")
@@ -196,11 +197,12 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
 
 
 def _hovers(flight: Flight, t: Floats) -> Mask:
-    """When a vehicle is carried by its motors alone: a copter always."""
-    if flight.is_copter:
-        return np.ones(len(t), dtype=bool)
+    """When a vehicle is carried by its motors alone: a copter until it flies so fast that the air bears unevenly on
+    its propellers."""
     moved = flight.one("GPS", "Spd")
-    return np.interp(t, moved.t, moved["Spd"]) < _HOVERS_MS if moved is not None else np.zeros(len(t), dtype=bool)
+    if moved is None:
+        return np.full(len(t), flight.is_copter)
+    return np.asarray(np.interp(t, moved.t, moved["Spd"]) < (_FAST_MS if flight.is_copter else _HOVERS_MS))
 
 
 def _excess(outputs: _Outputs, where: Mask) -> Iterator[NDArray[np.float64]]:
