@@ -193,3 +193,12 @@ def test_the_outputs_of_what_flies_very_fast_show_no_weak_motor(speed: float, is
     made.table["RCOU"]["C2"][made.after(50.0, DOWN_S)] += 300.0
     made.table["GPS"]["Spd"][made.after(49.0, DOWN_S)] = speed
     assert any("motor 2" in title for title in titles(made)) == is_told
+
+
+@pytest.mark.parametrize(("has_fix", "is_told"), [(False, False), (True, True)])
+def test_a_receiver_that_starts_while_it_is_armed_has_not_lost_its_satellites(has_fix: bool, is_told: bool) -> None:
+    made = Made()
+    starts = made.after(0.0, UP_S + 20.0)
+    made.table["GPS"]["NSats"][starts] = 4.0
+    made.table["GPS"]["Status"][starts & (made.t < UP_S - 1.0 if has_fix else starts)] = 1.0
+    assert any("satellites" in title for title in titles(made)) == is_told

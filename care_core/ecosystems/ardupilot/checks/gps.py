@@ -189,6 +189,15 @@ def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
         )
 
 
+def _started(flight: Flight, table: Table) -> Table:
+    """Without what a receiver says as it starts: until it first has a fix with satellites enough, or flies with one, no
+    mode relies on it."""
+    fixed = table["Status"] >= _FIX
+    enough = fixed & ((table["NSats"] >= FEWEST) | during(flight.flown, table.t))
+    first = enough if enough.any() else fixed
+    return table.where(slice(int(np.argmax(first)), None)) if first.any() else table
+
+
 def _drove(flight: Flight) -> bool:
     """Whether its throttle ever left its middle while it was armed; where none is recorded, it may have."""
     if flight.throttle is None:
@@ -199,8 +208,7 @@ def _drove(flight: Flight) -> bool:
 
 def _few(flight: Flight, table: Table) -> Iterator[Finding]:
     """Few satellites, or far fewer than before; a poor HDop."""
-    if not flight.armed and (table["Status"] >= _FIX).any():
-        table = table.where(slice(int(np.argmax(table["Status"] >= _FIX)), None))  # before it a receiver starts
+    table = _started(flight, table)
     t, sats = table.t, table["NSats"]
     if len(t) < 3 or not (table["Status"] >= _FIX).any():
         return
