@@ -139,8 +139,10 @@ def _steered(flight: Flight, at: float) -> str:
 def _fell_before(flight: Flight, since_s: float, at: float) -> bool:
     """Whether it came down already as the mode began in which it hit the ground: then its stick did not bring it
     down."""
-    if flight.height is None or at - since_s > _FALL_S:
-        return at - since_s < _FALL_S
+    if at - since_s > _FALL_S:
+        return False
+    if flight.height is None:
+        return True
     return float(np.interp(since_s - 1.0, *flight.height) - np.interp(since_s, *flight.height)) > _SINKS_M
 
 
