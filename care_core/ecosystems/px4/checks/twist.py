@@ -26,7 +26,7 @@ _SPENT = LIMITS.add("output with little left", 0.75, "of the range", "a choice: 
 _FLOWN_S = LIMITS.add("shortest flight", 10.0, "s", "a choice: a take-off turns it, too")
 _FEWEST = 4
 _TRUE = LIMITS.add("probability of a part", 0.6, "", "a choice: a wrong sign of CA_ROTORn_KM looks the same")
-_LOST = LIMITS.add("probability that it costs the mission", 0.2, "", "a choice: it flies, with less lift")
+_LOST = LIMITS.add("probability that it costs the mission", 0.5, "", "a choice: it flies, with little lift left")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
