@@ -9,7 +9,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import CAME_DOWN, Finding
+from care_core.ecosystems.findings import CAME_DOWN, STEERED, Finding
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"RCIN": ("C3",)}
@@ -80,7 +80,7 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def _what(flight: Flight, steered: str) -> str:
     if steered:
-        return "it flew into the ground as steered"
+        return STEERED
     if flight.struck_s is not None:
         return "it hit something"
     return "it crashed" if flight.hit is None else f"it hit {flight.hit.what} at {flight.hit.speed_ms:.1f} m/s"
