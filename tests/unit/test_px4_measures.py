@@ -148,6 +148,15 @@ def test_a_flight_that_broke_off_knows_what_it_reached() -> None:
     assert not found.all_reached
 
 
+@pytest.mark.parametrize(("last", "success"), [(6.0, 1.0), (5.0, 0.0)])
+def test_a_mission_is_whole_once_its_last_item_was_reached_whatever_has_no_place(last: float, success: float) -> None:
+    rows = [(5.0, -1.0), (20.0, 0.0), (40.0, 1.0), (60.0, 2.0), (85.0, 3.0), (86.0, last), (132.0, last)]
+    names = ("seq_reached", "seq_total", "finished", "failure", "mission_id", "instance_count")
+    result = table([(t, n, 7.0, 0.0, 0.0, 1.0, 1.0) for t, n in rows], *names)
+    held = flown()["navigator_mission_item"].between(0.0, 84.0)
+    assert value("px4_mission_success", mission(mission_result=result, navigator_mission_item=held)) == success
+
+
 def test_a_failsafe_and_where_it_landed_count() -> None:
     status = {**flown()["vehicle_status"].columns, "failsafe": steps((0, 0), (100, 1))}
     flags = Table(AT, {"battery_warning": steps((0, 0), (100, 2)), "geofence_breached": steps((0, 0))})
