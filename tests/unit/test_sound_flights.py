@@ -7,7 +7,7 @@ import pytest
 
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.measures.outcome import plain_checks
-from care_core.ecosystems.findings import NO_BATTERY, every_finding
+from care_core.ecosystems.findings import NO_BATTERY, UNDRIVEN, every_finding
 from care_core.ecosystems.measures import Mission
 from care_core.run import Setting
 from tests.flights import DOWN_S, END_S, UP_S, Made, flight_of
@@ -202,3 +202,18 @@ def test_a_receiver_that_starts_while_it_is_armed_has_not_lost_its_satellites(ha
     made.table["GPS"]["NSats"][starts] = 4.0
     made.table["GPS"]["Status"][starts & (made.t < UP_S - 1.0 if has_fix else starts)] = 1.0
     assert any("satellites" in title for title in titles(made)) == is_told
+
+
+@pytest.mark.parametrize(("throttle", "is_undriven"), [(0.0, True), (0.5, False)])
+def test_a_crash_that_the_firmware_finds_before_any_throttle_was_steered_by_nobody(
+    throttle: float, is_undriven: bool
+) -> None:
+    made = Made()
+    made.rows["MODE"] = [(0.0, {"ModeNum": 0.0})]
+    made.table["RCIN"] = {"C3": np.full(len(made.t), 1000.0)}
+    made.table["CTUN"]["ThO"][:] = throttle
+    for name, field in HEIGHTS:
+        made.table[name][field][:] = 0.0
+    made.rows["ERR"] = [(60.0, {"Subsys": 12.0, "ECode": 1.0})]
+    said = [one.title for one in every_finding(made.find()) if one.kind == "crash"]
+    assert (UNDRIVEN in said) == is_undriven

@@ -9,12 +9,12 @@ import numpy as np
 from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import CAME_DOWN, STEERED, Finding
+from care_core.ecosystems.findings import CAME_DOWN, STEERED, UNDRIVEN, Finding
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"RCIN": ("C3",)}
 
-_ERR_CRASH = 12
+_ERR_CRASH, _FEWEST = 12, 5
 LIMITS = Limits()
 _LOW_M = LIMITS.add("height of a tip-over", 1.5, "m", "a choice: lower than a person's chest")
 _TAKEOFF_S = LIMITS.add("tip-over after the first throttle", 15.0, "s", "a choice: a take-off takes no longer")
@@ -57,17 +57,19 @@ def find(flight: Flight) -> Iterator[Finding]:
         )
     elif told is not None or said is not None or impact is not None:
         first = min(t for t in (told, said, impact, flight.struck_s) if t is not None)
-        steered = _steered(flight, first)
+        undriven = _undriven(flight, first)
+        steered = "" if undriven else _steered(flight, first)
         is_said = told is not None or said is not None
         shown = (
             "the firmware says: crash" if is_said else "control was lost, and it came down" if lost is not None else "",
             "" if flight.hit is None else flight.hit.said,
             steered,
+            "no throttle was given since it was armed: does it estimate its attitude rightly?" if undriven else "",
             "a blow came before control was lost" if flight.struck_s is not None else "",
         )
         yield Finding(
             kind="crash",
-            title=_what(flight, steered),
+            title=UNDRIVEN if undriven else _what(flight, steered),
             onset_s=first,
             end_s=first,
             severity="critical",
@@ -119,6 +121,19 @@ def _tipped(flight: Flight, at: float) -> bool:
     t, throttle = driven
     up = t[(t >= span[0]) & (t <= at) & (throttle > _FIRST_THROTTLE)]
     return bool(len(up)) and at - float(up[0]) < _TAKEOFF_S
+
+
+def _undriven(flight: Flight, at: float) -> bool:
+    """Whether the firmware itself found a crash of a copter that stood on the ground with its motors at rest: it then
+    believes an attitude that it does not have."""
+    if not flight.is_copter or flight.throttle is None or flight.hit is not None:
+        return False
+    span = next((one for one in flight.armed if one[0] <= at <= one[1] + 3.0), None)
+    if span is None or any(start < at and end > span[0] for start, end in flight.airborne):
+        return False
+    t, throttle = flight.throttle
+    given = throttle[(t >= span[0]) & (t <= at)]
+    return len(given) > _FEWEST and float(np.max(given)) < _FIRST_THROTTLE
 
 
 def _steered(flight: Flight, at: float) -> str:

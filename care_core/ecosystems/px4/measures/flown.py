@@ -66,8 +66,8 @@ class FlownMission(Record, eq=False):
 
     @property
     def all_reached(self) -> bool:
-        """Whether every waypoint was reached: what follows them is the return or the landing, or nothing. A mission whose
-        last item was reached is whole, whatever of it has no place (a delay, a gripper, a take-off where it stood)."""
+        """Whether every waypoint was reached: what follows them is the return or the landing, or nothing. A mission
+        whose last item was reached is whole, whatever of it has no place (a delay, a gripper)."""
         if self.items is not None and self.reached >= self.items - 1 >= 0:
             return True
         return bool(self.places) and self.reached >= max(self.places) and self.has_all_places
