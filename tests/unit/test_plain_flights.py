@@ -246,3 +246,17 @@ def test_a_height_without_thrust_is_no_flight(throttle: float, *, has_flown: boo
     driven = np.where((at > 10.5) & (at < 69.5), throttle, 0.0)
     controls = replace(flight()["POS"], times=at, columns={"ThO": driven, "Alt": height})
     assert is_known(checks(flown(mode=0, CTUN=controls))["took_off"]) is has_flown
+
+
+@pytest.mark.parametrize(("sinks_m", "has_flown"), [(200.0, True), (5.0, False)])
+def test_a_plane_whose_log_begins_in_the_air_flew_though_it_only_sank(sinks_m: float, *, has_flown: bool) -> None:
+    position = flight()["POS"]
+    at = np.arange(0.0, 75.0, 0.5)
+    columns = {**position.columns, "RelHomeAlt": -np.linspace(0.0, sinks_m, len(position.t))}
+    falling = flown(
+        PLANE,
+        mode=0,
+        POS=replace(position, columns=columns),
+        GPS=replace(position, times=at, columns={"Spd": 20 + 0 * at}),
+    )
+    assert (checks(falling)["took_off"] == 1.0) is has_flown

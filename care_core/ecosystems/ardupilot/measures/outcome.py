@@ -44,6 +44,8 @@ _MOVED_M = 5.0
 _BARELY_M, _HOVERS_M = 0.5, 0.2
 """Rise below which a vehicle never left the ground: barometers drift by less in a flight's time; and where its own
 detector says that it left it."""
+_SINKS_M = 20.0
+"""No runway is so steep, and no barometer drifts so far in a flight's time."""
 _TOUCHED_S, _SWITCHED_OFF_S = 5.0, 0.05
 """Before the disarming, where the land detector found the ground: at most, and at least (disarming sets it as well)."""
 HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
@@ -143,13 +145,22 @@ def _took_off(mission: Mission, *, crashed: bool) -> Value:
     heights = _heights(mission)
     flight = flight_of(mission)
     lifted = not flight.is_copter or flight.throttle is None or bool(flight.airborne)  # no height without thrust
-    flew = lifted and ((len(heights) and bool(heights.max() > AIRBORNE_M)) or _detected(mission, _TOOK_OFF))
+    rose = len(heights) > 0 and bool(heights.max() > AIRBORNE_M)
+    flew = lifted and (rose or _began_aloft(mission) or _detected(mission, _TOOK_OFF))
     if flew or crashed:
         return float(flew)
     least_m = _BARELY_M if lifted else _HOVERS_M if _detected(mission, _TOOK_OFF) else np.inf
     if len(heights) and heights.max() > least_m:
         return Unavailable(f"it rose no higher than {heights.max():.1f} m: too little to tell a flight by")
     return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
+
+
+def _began_aloft(mission: Mission) -> bool:
+    """Whether a plane that moves as planes fly sank far below where the log begins: an autopilot that started in the
+    air takes its height there for that of the ground."""
+    flight, heights = flight_of(mission), _heights(mission)
+    fast = flight.is_winged and any(start < mission.end_s and end > mission.start_s for start, end in flight.airborne)
+    return fast and len(heights) > 0 and float(heights[0] - heights.min()) > _SINKS_M
 
 
 def _landed(mission: Mission) -> Value:
