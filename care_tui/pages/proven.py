@@ -76,6 +76,7 @@ class ProvenPage(DiagnosisPage):
         side = self.query_one("#side", Reader)
         rows = self.beside() if self.is_wide and self.has_content else []
         side.display = bool(rows)
+        self.query_one("#left").display = self.choices.display or side.display  # else the text has the whole width
         if rows:
             side.show(Rows(rows))
 

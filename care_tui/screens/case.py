@@ -118,6 +118,15 @@ class CaseScreen(Screen[None]):
     def session(self) -> Session:
         return self.workspace.session
 
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._give_focus_back)
+
+    def _give_focus_back(self) -> None:
+        """What is hidden loses the focus, so a terminal that was too small for a moment has nothing that takes keys."""
+        is_hidden = self.has_class("-too-narrow") or self.has_class("-too-low")
+        if self.focused is None and not is_hidden and self.query_one(ContentSwitcher).current is not None:
+            self.page.take_focus()
+
     # Turning to a page
 
     @property

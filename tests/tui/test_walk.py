@@ -564,6 +564,28 @@ async def test_a_terminal_that_is_too_small_is_said(make_app: MakeApp, size: tup
         assert "FAULT" in items(app)
 
 
+@pytest.mark.parametrize("least", [(59, 24), (80, 12)])
+async def test_keys_work_after_a_terminal_was_too_small_for_a_moment(make_app: MakeApp, least: tuple[int, int]) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "2", "home")
+        await pilot.resize_terminal(*least)
+        await settle(pilot)
+        await pilot.resize_terminal(80, 24)
+        await settle(pilot, "down")
+        assert index(app) == 1
+        assert "Causes" in str(app.screen.query_one(Keys).content), "the footer has the keys of the page"
+
+
+@pytest.mark.parametrize("step", "23")
+async def test_a_page_without_a_list_has_the_whole_width(make_app: MakeApp, step: str) -> None:
+    app = make_app(sample.unfitting())
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, step)
+        page = walk(app).page
+        assert page.choices.display or page.reader.outer_size.width == 120
+
+
 def test_every_binding_has_an_id_and_leaves_reserved_keys_alone() -> None:
     owners: tuple[type[DOMNode], ...] = (
         CareApp,
