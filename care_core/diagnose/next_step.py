@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
 from care_core.diagnose.records import Diagnosis, Fix, helps
-from care_core.ecosystems.findings import STEERED, Finding, FindingKind, every_finding
+from care_core.ecosystems.findings import NOT_FLOWN, STEERED, Finding, FindingKind, every_finding
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, vehicle_of
 from care_core.logs.formats import MAVLINK_TLOG, format_named
@@ -66,10 +66,18 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
         return f"look at what this names: {listed(named)}"
     if has_failed and diagnosis.tell_more:
         return diagnosis.tell_more[0]
-    if diagnosis.profile.fit.verdict != "no":
-        return ""
+    return _without_profile(diagnosis) if diagnosis.profile.fit.verdict == "no" else ""
+
+
+def _without_profile(diagnosis: Diagnosis) -> str:
+    """What to do with a log that no profile fits and in which nothing is seen to have failed."""
+    run = diagnosis.run
     if run.log.format == MAVLINK_TLOG.name and run.log.facts.get("stack") == "PX4":
         return "triage the .ulg that the vehicle itself wrote: profile px4 reads it, and telemetry holds little of it"
+    if diagnosis.health.too_little == NOT_FLOWN:
+        return "triage a log in which the vehicle was armed; 'care inspect LOG' shows what this one holds"
+    if diagnosis.health.too_little:
+        return "'care inspect LOG' shows what this log holds, 'care record PROFILE' what to record"
     return "'care inspect LOG' tells what each profile would need"
 
 

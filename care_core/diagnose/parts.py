@@ -107,4 +107,4 @@ def unmended(part: Finding) -> str:
     """Why no parameter is changed while this part has failed."""
     if is_pack(part):
         return f"{part.title}: charge or replace the battery; nothing is changed until it is full"
-    return f"{part.title} at {log_time(part.onset_s, 0)}: nothing is changed until that is mended"
+    return f"{part.title} at {log_time(part.onset_s)}: nothing is changed until that is mended"

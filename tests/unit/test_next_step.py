@@ -7,7 +7,7 @@ import pytest
 from care_core.diagnose.next_step import bench, next_step, trial, was_upset
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.diagnose.verdict import verdict_of
-from care_core.ecosystems.findings import STEERED, Finding, Health
+from care_core.ecosystems.findings import NOT_FLOWN, STEERED, TOO_SHORT, Finding, Health
 from care_core.records import replace
 from care_core.report.document import build_document, remembered_verdict
 from care_core.report.reading import remembered
@@ -63,7 +63,19 @@ def test_telemetry_of_a_px4_vehicle_is_no_log_of_it() -> None:
     unfit = replace(made.profile, fit=replace(made.profile.fit, verdict="no"))
     heard = replace(made, run=replace(made.run, log=log), profile=unfit)
     assert next_step(heard, has_failed=False).startswith("triage the .ulg that the vehicle itself wrote")
-    assert "care inspect" in next_step(replace(heard, run=made.run), has_failed=False)
+    assert "what each profile would need" in next_step(replace(heard, run=made.run), has_failed=False)
+
+
+@pytest.mark.parametrize(
+    ("why", "told"),
+    [(NOT_FLOWN, "in which the vehicle was armed"), (TOO_SHORT, "'care record PROFILE' what to record")],
+)
+def test_what_holds_no_run_is_not_sent_after_profiles(why: str, told: str) -> None:
+    made = failed()
+    unfit = replace(made.profile, fit=replace(made.profile.fit, verdict="no"))
+    said = next_step(replace(made, profile=unfit, health=replace(made.health, too_little=why)), has_failed=False)
+    assert told in said
+    assert "profile would need" not in said
 
 
 def test_what_drives_is_tried_at_walking_pace() -> None:
