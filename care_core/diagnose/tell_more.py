@@ -24,10 +24,10 @@ MOST_METRICS = 3
 AGAIN = "run again"
 SAME_AGAIN = (
     "run the same configuration again: if it fails again, the cause persists (a parameter outside the profile, or the "
-    "vehicle); if not, it is what this run met"
+    "vehicle); if not, it is something in the environment (wind, obstacle, load)"
 )
 TELL = "triage the log again with '--config FILE', the file that sets the robot's parameters, and record them next time"
-MET = "what this run met"
+MET = "something in the environment"
 """The rival of a cause that stands alone."""
 
 

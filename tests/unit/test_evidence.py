@@ -179,7 +179,7 @@ def test_the_experiment_separates_the_two_leading_causes(planted: Profile) -> No
     found = experiment(query_of(judged, planted), fault)
     assert found is not None
     (first, p_first), (second, p_second) = found.if_cause
-    assert {first, second} <= {cause.option.name for cause in fault.causes} | {"what this run met"}
+    assert {first, second} <= {cause.option.name for cause in fault.causes} | {"something in the environment"}
     assert abs(p_first - p_second) >= 0.15
     assert found.option.name in (first, second)
     assert experiment(query_of(judged, planted, (first, second)), fault) is None
