@@ -63,6 +63,13 @@ def test_a_folder_of_separate_bags_is_no_run(tmp_path: Path) -> None:
         open_log(tmp_path)
 
 
+def test_a_folder_without_a_log_is_not_sent_to_triage_again(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no log")
+    with pytest.raises(LogError, match="A folder, not a log") as caught:
+        open_log(tmp_path)
+    assert caught.value.hint == "Name a log file."
+
+
 def test_digest_of_a_folder(tmp_path: Path) -> None:
     write_split(tmp_path / "bags", ("run_0.bag", "run_1.bag"))
     both = (tmp_path / "bags" / "run_0.bag").read_bytes() + (tmp_path / "bags" / "run_1.bag").read_bytes()
