@@ -72,6 +72,8 @@ def apply(
     changed = [file for file in edited if file.edits]
     if out is None and not in_place:
         emit(patch_of(changed))
+        if changed:
+            say("no file was changed: -o NEW writes a new one, --in-place changes this one and keeps a backup")
     elif in_place:
         for file in changed:
             _replace(file)

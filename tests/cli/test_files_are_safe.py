@@ -68,6 +68,9 @@ def test_the_backup_is_as_private_as_the_file(care: Care, tmp_path: Path) -> Non
     assert care("params", SAMPLE, "--out", config).code == ExitCode.OK
     assert care("triage", SAMPLE, "--no-history", "--yaml", "--out", report).code == ExitCode.FAULT
     config.chmod(0o600)
+    before = config.read_bytes()
+    assert "no file was changed: -o NEW writes a new one" in care("apply", report, config).stderr
+    assert config.read_bytes() == before
     assert care("apply", report, config, "--in-place").code == ExitCode.OK
     assert care("apply", report, config, "-o", tmp_path / "new.param").code == ExitCode.OK
     for name in ("vehicle.param", "vehicle.param.bak", "new.param"):
