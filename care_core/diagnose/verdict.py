@@ -403,14 +403,14 @@ def fit_words(profile: str, verdict: FitVerdict) -> str:
     return f"Profile {profile} {FIT_WORDS[verdict]}" if profile else "No profile fits"
 
 
-def fit_line(profile: str, fit: Fit, lines: int = 1) -> str:
-    """The same in so many lines at most: the first reason, and how many more stand below."""
+def fit_line(profile: str, fit: Fit, lines: int = 1, line: int = LINE) -> str:
+    """The same in so many lines of so many cells at most: the first reason, and how many more stand below."""
     if not profile:
         return f"No profile fits this log: {NO_LIMITS}"
     if not fit.reasons:
         return fit_words(profile, fit.verdict)
     more = f" (and {len(fit.reasons) - 1} more)" if len(fit.reasons) > 1 else ""
-    width = LINE if lines == 1 else lines * LINE - _BROKEN
+    width = line if lines == 1 else lines * line - _BROKEN
     text = f"{fit_words(profile, fit.verdict)}: {fit.reasons[0]}"
     return f"{textwrap.shorten(text, width - len(more), placeholder=' ...')}{more}"
 

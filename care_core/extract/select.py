@@ -13,6 +13,7 @@ from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, available_profiles, load_profile
 from care_core.run import Fit, ProfileChoice, Settings
+from care_core.text import listed
 
 NEARLY_AS_WELL = 0.9
 """Another profile is named when it matches at least this share of what the chosen one does."""
@@ -115,7 +116,7 @@ def _none_fits(log: Log, covered: Sequence[Coverage], fits: Sequence[Fit], order
     elif not readers:
         reasons = (f"none of the {len(covered)} installed profiles reads {log.format.name}",)
     elif not reasons:
-        names = " and ".join(coverage.schema.name for coverage in readers)
+        names = listed([coverage.schema.name for coverage in readers])
         reasons = (f"nothing that {names} would read is in the log",)
     return ProfileChoice("", "", "", "", Fit("no", reasons))
 

@@ -17,6 +17,7 @@ from care_tui.session import Session
 
 _LABEL = 9
 _FITS = "profile fits"
+_MARK = "! "
 _LEAST = 12
 """Cells that are left of a change, however narrow the terminal."""
 
@@ -39,7 +40,7 @@ def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) 
         head = Content.assemble("Reading ", (name, "bold"), ("  esc stops", "dim"))
         return [head, progress_bar(fraction, glyphs) + text(f"  {step}")]
     lines = [_head(session.diagnosis, glyphs, width), *_cause_and_change(session, glyphs, width, is_low=is_low)]
-    return [*lines, *_limits(session.diagnosis, is_low=is_low)]
+    return [*lines, *_limits(session.diagnosis, width, is_low=is_low)]
 
 
 def _head(diagnosis: Diagnosis, glyphs: Glyphs, width: int) -> Content:
@@ -118,13 +119,13 @@ def _change(session: Session, glyphs: Glyphs, width: int) -> Content | None:
     return head + _cut(what, max(room - tail.cell_length, _LEAST), glyphs) + more + tail
 
 
-def _limits(diagnosis: Diagnosis, *, is_low: bool) -> Iterator[Content]:
+def _limits(diagnosis: Diagnosis, width: int, *, is_low: bool) -> Iterator[Content]:
     """What limits the answer, where something does."""
     fit = diagnosis.profile.fit
     found = warnings_of(diagnosis)
     if fit.verdict != "fits":
         style = "$text-warning" if fit.verdict == "partly" else "bold $text-error"
-        yield Content.styled(f"! {clean(fit_line(diagnosis.profile.title, fit))}", style)
+        yield Content.styled(f"! {clean(fit_line(diagnosis.profile.title, fit, line=width - len(_MARK)))}", style)
     if found and not (is_low and fit.verdict != "fits"):
         yield Content.styled("! " + clean("; ".join(found)), "$text-warning")
 

@@ -174,6 +174,7 @@ def test_the_fit_comes_last_in_two_lines_at_most_and_names_no_profile_that_does_
     assert verdict.fit.startswith("Profile copter partly fits: the log does not say what vehicle")
     assert verdict.fit.endswith("(and 2 more)")
     assert len(fit_line("copter", Fit("partly", reasons))) <= 80
+    assert len(fit_line("copter", Fit("partly", reasons))) < len(fit_line("copter", Fit("partly", reasons), line=118))
     none = verdict_on([], fit=Fit("no", ("arducopter: it is for a copter, this is a plane",)), profile="").fit
     assert none == "No profile fits this log: no limits for time and energy, no causes by parameters"
 
