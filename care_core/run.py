@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, TypeGuard
 
 from care_core.records import Record, field
+from care_core.text import log_time
 
 
 class Unavailable(Record):
@@ -59,6 +60,13 @@ class Damage(Record):
     time_s: float | None = None
     is_jump: bool = False
     """Whether the clock of the log jumps there: what lies between two records of it is unknown."""
+
+
+def place_of_damage(what: str, byte: int | None, time_s: float | None) -> str:
+    """` at byte N, at 3.5 s`, without what the words say themselves."""
+    at = "" if byte is None or f"at byte {byte}" in what else f" at byte {byte}"
+    time = "" if time_s is None else log_time(time_s)
+    return at + (f", at {time}" if time and f"to {time}" not in what else "")
 
 
 class Evidence(Record):

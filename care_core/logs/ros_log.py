@@ -425,7 +425,7 @@ class RosLog:
                     worst_ns, topic = int(steps.min()), part.connections[number].topic
                     at = int(kept[steps.argmin()])
         if topic:
-            text = f"messages are not in order of time, by up to {-worst_ns / 1e9:.1f} s ({topic}); they are sorted"
+            text = f"messages were sorted by time: up to {-worst_ns / 1e9:.1f} s out of order ({topic})"
             yield Damage(text, None, self._seconds(at))
 
 

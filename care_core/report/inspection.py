@@ -25,7 +25,7 @@ from care_core.report.entries import (
 )
 from care_core.report.health import account_lines, finding_lines
 from care_core.report.published import Document, publish
-from care_core.run import Damage, Fit, MissionInfo, ProfileChoice
+from care_core.run import Damage, Fit, MissionInfo, ProfileChoice, place_of_damage
 from care_core.text import WIDTH, clean, log_time, wrapped
 
 INSPECT_ID: Final = "care.inspect/1"
@@ -306,8 +306,7 @@ def _damage_lines(damage: Sequence[DamageEntry]) -> Iterator[str]:
 
 
 def _place(entry: DamageEntry) -> str:
-    byte = "" if entry.byte is None else f" at byte {entry.byte}"
-    return byte + ("" if entry.time_s is None else f", at {log_time(entry.time_s)}")
+    return place_of_damage(entry.what, entry.byte, entry.time_s)
 
 
 def _parameter_lines(found: ParameterEntry) -> Iterator[str]:

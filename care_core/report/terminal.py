@@ -12,7 +12,7 @@ from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
 from care_core.report.health import account_lines, finding_lines, reason_lines
 from care_core.report.shared_causes import together
-from care_core.run import Value, is_known
+from care_core.run import Value, is_known, place_of_damage
 from care_core.text import listed, log_time, log_times, wrapped
 from care_core.variables import Variable
 
@@ -64,8 +64,7 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     elif diagnosis.profile.fit.verdict == "no":
         yield from wrapped("none fits", "Profile  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
-        at = "" if damage.time_s is None else f" at {log_time(damage.time_s)}"
-        yield from wrapped(f"{damage.what}{at}", "Damage   ")
+        yield from wrapped(damage.what + place_of_damage(damage.what, None, damage.time_s), "Damage   ")
     if len(run.log.damage) > DAMAGE_SHOWN:
         rest = len(run.log.damage) - DAMAGE_SHOWN
         yield f"Damage   and {rest} more {'places' if rest > 1 else 'place'}, 'care inspect' lists them"

@@ -9,7 +9,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.verdict import STATUS_WORDS
-from care_core.run import Damage, Evidence, is_known
+from care_core.run import Damage, Evidence, is_known, place_of_damage
 from care_core.text import clean, seconds
 from care_tui.render.rows import (
     LABEL_WIDTH,
@@ -137,9 +137,8 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
 
 
 def damage(part: Damage) -> str:
-    byte = "" if part.byte is None else f" at byte {part.byte}"
-    time = "" if part.time_s is None else f" at {seconds(part.time_s)}"
-    return f"{part.what}{byte}{time}"
+    """What is broken, and where."""
+    return part.what + place_of_damage(part.what, part.byte, part.time_s)
 
 
 def evidence_row(part: Evidence, option: str = "") -> Row:

@@ -248,6 +248,6 @@ def test_clock_that_was_set_and_stray_times(tmp_path: Path) -> None:
     assert jump.damage[0].what == "the clock jumps: no message for 11.6 days"
     assert jump.damage[0].time_s == pytest.approx(9.9)
     back = open_log(tmp_path / "back.mcap")
-    assert "up to 4.9 s (/imu); they are sorted" in back.damage[0].what
+    assert "sorted by time: up to 4.9 s out of order (/imu)" in back.damage[0].what
     table = back.read({"/imu": ("linear_acceleration.x",)})["/imu"]
     assert np.all(np.diff(table.t) >= 0)
