@@ -53,7 +53,10 @@ def health_row_item(one: FindingRow, glyphs: Glyphs) -> Content:
     """One line of the pane. A finding has a sign and a word, what is folded under it is set in, an event is plain."""
     time = f"{seconds(one.time_s):>{TIME_WIDTH}}  "
     if isinstance(one.what, Event):
-        return Content.assemble("  ", padded(one.what.kind, KIND_WIDTH), time, text(one.what.text))
+        kind = padded(one.what.kind, KIND_WIDTH)
+        # A kind that is wider than its column takes of the blanks before the time.
+        narrower = f"{seconds(one.time_s):>{max(TIME_WIDTH + KIND_WIDTH - kind.cell_length, 0)}}  "
+        return Content.assemble("  ", kind, narrower, text(one.what.text))
     late = "  (after it was down)" if one.what.after_impact else ""
     if one.cause is not None:
         return Content.assemble(

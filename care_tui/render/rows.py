@@ -197,9 +197,10 @@ def joined(parts: Iterable[Content], gap: str) -> Content:
 
 
 def labelled(label: str, value: Content | str, style: str = "") -> Row:
-    """A row `label  value` with the values in one column."""
+    """A row `label  value` with the values in one column; a label that is wider than that has a colon."""
     body = text(value) if isinstance(value, str) else value
-    return Row(Content.assemble((f"{label:<{LABEL_WIDTH - 1}} ", style), body), LABEL_WIDTH)
+    head = f"{label:<{LABEL_WIDTH - 1}} " if len(label) < LABEL_WIDTH else f"{label}: "
+    return Row(Content.assemble((head, style), body), LABEL_WIDTH)
 
 
 def heading(value: str) -> Row:

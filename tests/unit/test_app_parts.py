@@ -13,13 +13,16 @@ from rich.cells import cell_len
 
 from care_core.application.case import decided
 from care_core.causal.model import Summary
+from care_core.ecosystems.findings import Event
 from care_core.errors import ConfigError, UsageError
 from care_core.records import replace
+from care_core.run import Damage
 from care_core.variables import Role, Variable
 from care_tui.basket import Basket, nudged, parsed, possible
 from care_tui.clipboard import MAX_BYTES, fits, osc52
-from care_tui.render.objectives import objective_detail
-from care_tui.render.rows import UNICODE, without_middle
+from care_tui.render.health import FindingRow, health_row_item
+from care_tui.render.objectives import damage, objective_detail
+from care_tui.render.rows import UNICODE, labelled, without_middle
 from care_tui.settings import Settings, load_settings, prepare_terminal, takes_only_ascii, with_flags
 from tests.made import made_diagnosis
 from tests.tui import sample_diagnosis as sample
@@ -201,3 +204,28 @@ def test_the_ruler_of_an_objective_is_one_line(room: int) -> None:
     rows = objective_detail(sample.SLOW, summary, UNICODE, room)
     (ruler,) = [row for row in rows if UNICODE.rule * 5 in row.content.plain]
     assert ruler.content.cell_length <= room
+
+
+def test_a_label_that_is_wider_than_its_column_does_not_run_into_its_text() -> None:
+    assert labelled("It led to", "a crash").content.plain == "It led to     a crash"
+    assert labelled("Seen just before it", "no path").content.plain == "Seen just before it: no path"
+
+
+@pytest.mark.parametrize(
+    ("part", "told"),
+    [
+        (Damage("a packet has a wrong checksum", 12, 3.5), "a packet has a wrong checksum at byte 12, at 3.5 s"),
+        (Damage("a line's time is impossible", 12), "a line's time is impossible at byte 12"),
+        (Damage("read to 3.5 s, cut at byte 12: cut short", 12, 3.5), "read to 3.5 s, cut at byte 12: cut short"),
+    ],
+)
+def test_where_a_log_is_damaged_is_said_once(part: Damage, told: str) -> None:
+    assert damage(part) == told
+
+
+def test_times_of_events_stand_in_one_column_whatever_their_kind() -> None:
+    lines = [
+        health_row_item(FindingRow(Event(1.0, "a log says", kind, "")), UNICODE).plain
+        for kind in ("error", "diagnostics")
+    ]
+    assert len({line.index("1.0 s") for line in lines}) == 1
