@@ -26,6 +26,7 @@ from care_tui.render.rows import (
     padded,
     plain_rows,
     text,
+    warning,
     without_middle,
 )
 from care_tui.widgets.choices import Listing
@@ -207,11 +208,15 @@ def _silent(_step: str, _share: float) -> None:
 
 
 def comparison(past: Past, other: Past) -> list[Row]:
-    """Two runs side by side: objectives, then the options that differ."""
-    rows = [_columns("Objective", "this run", _named(other), "bold")]
+    """Two runs side by side: objectives, then the parameters that differ."""
+    rows: list[Row] = []
+    if past.profile != other.profile:
+        judged = f"this run was judged by {past.profile or 'no profile'}, the other by {other.profile or 'no profile'}"
+        rows += [warning("Note", judged), Row(Content())]
+    rows += [_columns("Objective", "this run", _named(other), "bold")]
     rows += [_columns(name, _shown(value), _shown(other.values.get(name))) for name, value in past.values.items()]
     names = [name for name in past.config if past.config[name] != other.config.get(name)]
-    rows += [Row(Content()), _columns("Option", "this run", _named(other), "bold")]
+    rows += [Row(Content()), _columns("Parameter", "this run", _named(other), "bold")]
     if not names:
         rows.append(Row(Content("all parameters are alike")))
     return rows + [_columns(name, f"{past.config[name]:.6g}", _known(other.config.get(name))) for name in names]
