@@ -11,6 +11,16 @@ from care_tui.render.rows import Glyphs
 from care_tui.session import Session
 from care_tui.settings import Settings
 
+_CHOSEN = {
+    "profile": "the profile that was named",
+    "configs": "the configuration file",
+    "keep": "what is to be kept",
+    "thresholds": "your limits",
+    "since": "the good run",
+    "reference": "the reference",
+}
+"""What a log is judged by, in the words that name it to whoever chose it."""
+
 
 class Workspace(Struct, eq=False):
     """Handed to every page; the screen replaces the session when another log is opened."""
@@ -45,11 +55,9 @@ class Workspace(Struct, eq=False):
 
 
 def left_out(before: Request, now: Request) -> list[str]:
-    """The options by which one log is judged and another is not."""
-    options = ("profile", "config", "keep", "threshold", "since", "reference")
-    fields = ("profile", "configs", "keep", "thresholds", "since", "reference")
+    """By what one log is judged and another is not: options of the command line, or what was chosen in the app."""
     return [
-        f"--{option}"
-        for option, name in zip(options, fields, strict=True)
+        words
+        for name, words in _CHOSEN.items()
         if getattr(before, name) and getattr(before, name) != getattr(now, name)
     ]

@@ -26,7 +26,7 @@ from care_core.diagnose.verdict import verdict_of
 from care_core.ecosystems.findings import Health
 from care_core.errors import CareError
 from care_core.records import Record, replace
-from care_core.text import clean
+from care_core.text import clean, listed
 from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Answered, Decided, Go, Judge, OpenLog, Progressed
 from care_tui.page_names import LOGS, NAMES, PAGES, STEPS, VIEWS
@@ -292,7 +292,7 @@ class CaseScreen(Screen[None]):
         """Diagnose a log by what belongs to it; what was chosen for the one before is gone."""
         before, request = self.workspace.request, self.workspace.request_for(path)
         request = request if mission is None else replace(request, mission=mission)
-        if before is not None and (left_behind := " and ".join(left_out(before, request))):
+        if before is not None and (left_behind := listed(left_out(before, request))):
             told = f"Judged by itself: {left_behind} stayed with {before.log.name}."
             self.app.notify(clean(told), markup=False)
         await self._read(request)

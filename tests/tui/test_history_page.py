@@ -95,8 +95,19 @@ async def test_past_runs_show_trends_and_two_are_compared() -> None:
         assert times[1:] == ["140", "187"]
         assert speeds[1:] == ["50", "16"]
         assert "WPNAV_SPEED" not in text(app), "options that are alike are left out"
+        assert "Parameter " in text(app)
+        assert "was judged by" not in text(app), "they are runs of one robot"
         await settle(pilot, "k", "k", "x")
         assert title(app).startswith("3 runs"), "x on the marked run takes the mark away"
+
+
+async def test_runs_that_two_profiles_judged_are_said_to_be() -> None:
+    made = run_of(1, 140.0, 50.0)
+    assert remember_triage(replace(made, profile=replace(made.profile, name="nav2"))) is None
+    app = remembering_app()
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "y", "x", "j")
+        assert "this run was judged by nav2, the other by" in " ".join(text(app).split())
 
 
 async def test_enter_puts_a_run_and_the_marked_one_side_by_side_in_full() -> None:
@@ -187,7 +198,7 @@ async def test_options_belong_to_the_log_that_they_were_given_for(tmp_path: Path
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "y", "j", "enter")
         assert asked[-1] == Request(Path("/flights/00000001.BIN"), site=site, top=10)
-        assert "--threshold and --since stayed with 00000042.BIN" in app.title
+        assert "your limits and the good run stayed with 00000042.BIN" in app.title
         await settle(pilot, "y", *"/0042", "enter", "enter")
         assert asked[-1] == given, "back at the log that they were given for they hold"
 
