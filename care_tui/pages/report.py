@@ -9,7 +9,7 @@ from textual.binding import Binding, BindingType
 from textual.content import Content
 
 from care_core.errors import CareError
-from care_core.report.formats import FILE_FORMATS, FORMATS
+from care_core.report.formats import FILE_FORMATS, FORMATS, format_of
 from care_core.text import clean, number_of
 from care_tui.copying import copy
 from care_tui.pages.diagnosis import DiagnosisPage
@@ -80,8 +80,24 @@ class ReportPage(DiagnosisPage):
             written = Path(path)
             self.workspace.written.append(written)
             self._written = str(written.relative_to(Path.cwd()) if written.is_relative_to(Path.cwd()) else written)
+            self._show_written(written)
+
+    def _show_written(self, path: Path) -> None:
+        """Show what was written, whatever format the name of the file chose."""
+        session = self.session
+        format = format_of(path)
+        if format in FILE_FORMATS and format is not session.format:
+            session.format = format
+            self._written_text = None
+            self.enter()
+        else:
             self._written_text = self._answers.get(REPORT)
-            self.show()
+        self.show()
+
+    def take(self, question: str, answer: object) -> None:
+        if question == REPORT and self._written and self._written_text is None:
+            self._written_text = answer
+        super().take(question, answer)
 
     def action_copy_commands(self) -> None:
         """Copy the commands that apply the fix."""

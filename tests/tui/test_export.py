@@ -50,6 +50,15 @@ async def test_export_writes_the_format_in_view_beside_the_operator(
         assert f"written to {name}" in title(app)
 
 
+async def test_a_file_whose_name_chose_another_format_is_what_is_shown(make_app: MakeApp, tmp_path: Path) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot, "6", "e", "ctrl+u", *"other.md", "enter")
+        assert (tmp_path / "other.md").read_text().startswith("report: markdown")
+        assert "Report as Markdown: written to other.md" in title(app)
+        assert text(app).startswith("report: markdown")
+
+
 @pytest.mark.parametrize(("answer", "replaced"), [("y", True), ("n", False), ("escape", False)])
 async def test_an_existing_file_is_replaced_only_when_asked_for(
     make_app: MakeApp, tmp_path: Path, answer: str, replaced: bool
