@@ -178,17 +178,17 @@ class FixPage(DiagnosisPage):
         self.post_message(Decided())
 
     def action_alternative(self) -> None:
-        """Load the next fix that the engine found."""
+        """Load the next fix that was found."""
         found = [changes_of(fix) for fix in fixes(self.session.diagnosis)]
         if not found:
-            self.say("The engine found no fix.")
+            self.say("No change is known that helps.")
             return
         ticked = self.session.basket.ticked
         place = (found.index(ticked) + 1) % len(found) if ticked in found else 0
         self.session.basket.load(found[place])
         self.post_message(Decided())
         if len(found) == 1:
-            self.say("This is the suggestion; the engine found no alternative.")
+            self.say("This is the suggestion again: there is no alternative to it.")
             return
         what = "the suggestion" if place == 0 else f"alternative {place} of {len(found) - 1}"
         self.say(f"This is {what}.")

@@ -46,5 +46,5 @@ class HelpScreen(ModalScreen[None]):
             for key, does, id in self._keys
         ]
         with Vertical(classes="dialog"):
-            yield Static("Keys that work here (Esc closes)", classes="title", markup=False)
+            yield Static("Help and keys (Esc closes)", classes="title", markup=False)
             yield Reader(self._glyphs, Rows(rows), id="help")
