@@ -3,13 +3,14 @@ future."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.lint.readers import Readers, warning
 from care_core.lint.scopes import COSTMAP
 
-_SAME_PLACE = {"base_link", "base_footprint"}
+_ABOVE = re.compile(r"base_(link|footprint)$")
 """Frames of one robot that stand above each other (REP 105 and 120): for a plan one is as good as the other."""
 _LATEST_S = 5.0
 """Transforms this far in the future, s: Nav2 and ROS 1 have 1.0 and 0.1, slow computers set 2."""
@@ -23,11 +24,11 @@ def _bases(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if (entry := reader.values.get("robot_base_frame") or reader.values.get("base_frame_id")) is not None
     ]
     frames = {_frame(entry) for _, entry in found}
-    if len(frames) < 2 or frames <= _SAME_PLACE or any("$" in one for one in frames):
+    if len({_body(frame) for frame in frames}) < 2 or any("$" in one for one in frames):
         return
     counts = {frame: sum(_frame(entry) == frame for _, entry in found) for frame in frames}
     most = max(counts, key=lambda one: counts[one])
-    odd = [(name, entry) for name, entry in found if _frame(entry) != most and {_frame(entry), most} != _SAME_PLACE]
+    odd = [(name, entry) for name, entry in found if _body(_frame(entry)) != _body(most)]
     others = [entry for _, entry in found if _frame(entry) == most]
     for name, entry in odd[:1]:
         text = f"{entry.keys[-1]} of {name} is {_frame(entry)}, and of the others {most}: one robot has one frame."
@@ -37,6 +38,11 @@ def _bases(file: ConfigFile, held: Readers) -> Iterator[Problem]:
 
 def _frame(entry: Entry) -> str:
     return str(entry.value).strip("/")
+
+
+def _body(frame: str) -> str:
+    """The robot that a frame is of: `robot1/base_link` and `robot1/base_footprint` are of one."""
+    return _ABOVE.sub("base", frame)
 
 
 def _postdated(file: ConfigFile, held: Readers) -> Iterator[Problem]:

@@ -17,24 +17,27 @@ _PRIVATE = spanned("foxy-jazzy", "ros2")
 
 
 def _heights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
-    """Sources that keep no point above the floor. Nav2 takes 0.0 m where nothing is written, ROS 1 2.0 m; a log may
-    lack values that the robot had."""
-    for reader in held.of(*OBSTACLES):
+    """Sources that keep no point above the frame's own height. Nav2 takes 0.0 m where nothing is written, ROS 1 2.0 m.
+
+    Of a file alone: a robot that drove shows by its costmap whether its laser lies at that height, as some simulated
+    ones do.
+    """
+    for reader in held.of(*OBSTACLES) if file.text else ():
         for name in _sources(reader):
             entry, first = reader.values.get(f"{name}.max_obstacle_height"), _first(reader, name)
             if reader.is_off(f"{name}.marking") or first is None:
                 continue
             if entry is not None and entry.number == 0:
-                text = f"max_obstacle_height of {name} is 0: of what it sees above the floor nothing is marked."
+                text = f"max_obstacle_height of {name} is 0: what it sees above the floor is not marked."
                 yield warning("cannot-work", file, entry, text, "It must be above 0.", _BUFFER)
-            elif entry is None and file.format is ROS2_YAML and file.text:
-                text = f"max_obstacle_height of {name} is not set, and 0 then: of what it sees above the floor nothing "
-                text += "is marked."
-                others = [reader.values["max_obstacle_height"]] if "max_obstacle_height" in reader.values else []
+            elif entry is None and file.format is ROS2_YAML:
+                text = f"max_obstacle_height of {name} is not set, and 0 then: what it sees above the floor is not "
+                text += "marked."
+                others = ("max_obstacle_height",) if "max_obstacle_height" in reader.values else ()
                 hint = (
                     f"Write max_obstacle_height below {name}{', not beside it alone' if others else ''}: 2.0 is usual."
                 )
-                yield warning("cannot-work", file, reader.values[first], text, hint, _BUFFER, others)
+                yield problem_at("hinders", Severity.NOTE, file, reader.values[first], text, hint, _BUFFER)
 
 
 def _sources(reader: Reader) -> tuple[str, ...]:

@@ -224,6 +224,8 @@ def test_a_list_of_sources_is_no_text(tmp_path: Path) -> None:
     [
         ("base_link", "base_link", "base_link", 0),
         ("base_footprint", "base_link", "base_link", 0),
+        ("robot1/base_footprint", "robot1/base_link", "robot1/base_link", 0),
+        ("robot1/base_link", "robot2/base_link", "robot2/base_link", 1),
         ("base_link", "base_link", "robot_base", 1),
         ("chassis", "base_link", "base_link", 1),
         ("chassis", "chassis", "chassis", 0),

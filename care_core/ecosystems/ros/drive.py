@@ -186,7 +186,7 @@ class Drive(RunModel):
         if not sampled:
             return super().decode(wanted)
         known = {one.name: MESSAGES.get(type_of(one)) for one in self.channels if one.name in sampled}
-        most = {name: 0 if one is None else one.at_most for name, one in known.items()}
+        most = {name: bumpers.AT_MOST if one is None else one.at_most for name, one in known.items()}
         thinned = {name: count for name, count in most.items() if count and name not in wanted}
         tables = self.log.read(merge_needs((wanted, sampled)), thinned)
         for name in sampled.keys() & tables.keys():

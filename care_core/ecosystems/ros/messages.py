@@ -142,6 +142,8 @@ _BATTERY = {
 _ANGLES = {"angle_min": _number("rad", most=_FAST), "angle_increment": _number("rad", most=_FAST)}
 _TARGET = "goal.target_pose"
 _TRANSFORM = "transforms.transform.translation"
+PLACED = ("transforms.header.frame_id", "transforms.child_frame_id", f"{_TRANSFORM}.x", f"{_TRANSFORM}.y")
+"""What of transforms says where a frame is."""
 
 
 def _reads(*fields: str, at_most: int = 0, label: str = "") -> RosMessage:
@@ -170,8 +172,7 @@ MESSAGES: Mapping[str, RosMessage] = {
     RECOVERY: _reads("recovery_behavior_name"),
     TRANSITION: _reads("start_state.label", "goal_state.label"),
     **dict.fromkeys(TF, _reads(
-        "transforms.header.frame_id", "transforms.child_frame_id", f"{_TRANSFORM}.x", f"{_TRANSFORM}.y",
-        *(f"transforms.transform.rotation.{axis}" for axis in "xyzw"),
+        *PLACED, *(f"transforms.transform.rotation.{axis}" for axis in "xyzw"),
         at_most=10_000, label="transforms",
     )),
     ACTION_GOAL: _reads(

@@ -19,6 +19,7 @@ from care_core.ecosystems.ros.messages import (
     MESSAGES,
     ODOMETRY,
     PATH,
+    PLACED,
     POSE,
     STATUS,
     TF,
@@ -60,7 +61,7 @@ PLAN_FIELDS = (
     f"{_PATH}.orientation.w",
 )
 _ROTATION = "transforms.transform.rotation"
-TF_FIELDS = (*MESSAGES[TF[0]].reads, f"{_ROTATION}.z", f"{_ROTATION}.w")
+TF_FIELDS = (*PLACED, f"{_ROTATION}.z", f"{_ROTATION}.w")
 _PLACE_FIELDS = (FRAME, *MESSAGES[LOCALISED].reads)
 _MOST_TRANSFORMS = 10_000
 

@@ -14,7 +14,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros.checks.drive import standstills
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive, way_through
-from care_core.ecosystems.ros.messages import COMMANDS, GOALS, MESSAGES, ODOMETRY, TF, holds, reading
+from care_core.ecosystems.ros.messages import COMMANDS, GOALS, ODOMETRY, PLACED, TF, holds, reading
 from care_core.ecosystems.ros.motion import IN_TURN_M as TURN_M
 from care_core.ecosystems.ros.motion import STALE_S, Odometry, never_moved
 from care_core.logs.base import Table
@@ -258,7 +258,7 @@ def _corrections(drive: Drive) -> Iterator[Finding]:
     for topic, table in drive.of(*TF):
         if not holds(table, TF[0]):
             continue
-        places = _map_to_odom(table.t, *(table[name] for name in MESSAGES[TF[0]].reads[:4]))
+        places = _map_to_odom(table.t, *(table[name] for name in PLACED))
         if len(places) < PLACES:
             continue
         t, x, y = places.T
