@@ -117,6 +117,17 @@ class CausesPage(ProvenPage):
             return len(self.session.diagnosis.faults) > 1
         return super().check_action(action, parameters)
 
+    def label(self, binding: Binding) -> str:
+        is_back = binding.id == "causes.dismiss" and self.option_name() in self.session.dismissed
+        return "Take back" if is_back else super().label(binding)
+
+    def show(self, index: int | None = None) -> None:
+        super().show(index)
+        self.refresh_bindings()
+
+    def moved(self, index: int) -> None:
+        self.refresh_bindings()
+
     @property
     def _here(self) -> Explanation | None:
         """The explanation under the cursor."""

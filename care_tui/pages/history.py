@@ -123,7 +123,7 @@ class HistoryPage(Page):
         mark = "*" if past == self._marked else " "
         line = Content(f"{mark} {past.at[:16].replace('T', ' ')}  ")
         fit = "" if past.fit == "fits" else f"  ({fit_words(past.profile, past.fit).removeprefix('Profile ')})"
-        name = without_middle(_named(past), LOG_WIDTH, self.glyphs)
+        name = without_middle(_named(past), LOG_WIDTH - 1, self.glyphs)
         told = f" {by_options(past.judged_with)}{past.verdict}"
         return line + padded(name, LOG_WIDTH, "bold") + text(told) + text(fit, "dim")
 

@@ -171,6 +171,7 @@ async def test_a_cause_set_aside_leaves_the_fix_and_its_reason_is_in_the_report(
         await settle(pilot, *"slow on purpose", "enter")
         assert "set aside: slow on purpose" in items(app)
         assert "taken out of the fix" in hints(app)
+        assert "d Take back" in str(app.screen.query_one(Keys).content)
         await settle(pilot, "6")
         assert text(app) == "report: yaml\n  aside: LAND_SPEED: slow on purpose"
         await settle(pilot, "3", "d")
