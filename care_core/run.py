@@ -62,11 +62,15 @@ class Damage(Record):
     """Whether the clock of the log jumps there: what lies between two records of it is unknown."""
 
 
-def place_of_damage(what: str, byte: int | None, time_s: float | None) -> str:
-    """` at byte N, at 3.5 s`, without what the words say themselves."""
+def place_of_damage(what: str, byte: int | None, time_s: float | None, told: Callable[[float], str] = log_time) -> str:
+    """` at byte N, at 3.5 s`, without what the words say themselves.
+
+    Args:
+        told: how a time is written.
+    """
     at = "" if byte is None or f"at byte {byte}" in what else f" at byte {byte}"
-    time = "" if time_s is None else log_time(time_s)
-    return at + (f", at {time}" if time and f"to {time}" not in what else "")
+    is_told = time_s is None or f"to {log_time(time_s)}" in what
+    return at if is_told or time_s is None else f"{at}, at {told(time_s)}"
 
 
 class Evidence(Record):

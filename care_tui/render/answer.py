@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
-from care_core.diagnose.verdict import fit_line, hypothesis_text, verdict_of
+from care_core.diagnose.verdict import LINE, fit_line, hypothesis_text, verdict_of
 from care_core.ecosystems.findings import every_finding
 from care_core.text import clean
 from care_tui.render.health import warnings_of
@@ -18,6 +18,8 @@ from care_tui.session import Session
 _LABEL = 9
 _FITS = "profile fits"
 _MARK = "! "
+_NARROW = 70
+"""Cells below which a reason is told beyond the edge."""
 _LEAST = 12
 """Cells that are left of a change, however narrow the terminal."""
 
@@ -125,9 +127,15 @@ def _limits(diagnosis: Diagnosis, width: int, *, is_low: bool) -> Iterator[Conte
     found = warnings_of(diagnosis)
     if fit.verdict != "fits":
         style = "$text-warning" if fit.verdict == "partly" else "bold $text-error"
-        yield Content.styled(f"! {clean(fit_line(diagnosis.profile.title, fit, line=width - len(_MARK)))}", style)
+        yield Content.styled(_MARK + clean(fit_line(diagnosis.profile.title, fit, line=_room_of_fit(width))), style)
     if found and not (is_low and fit.verdict != "fits"):
-        yield Content.styled("! " + clean("; ".join(found)), "$text-warning")
+        yield Content.styled(_MARK + clean("; ".join(found)), "$text-warning")
+
+
+def _room_of_fit(width: int) -> int:
+    """Where there is little room the first reason says more than how many others there are, which are cut off then."""
+    room = width - len(_MARK)
+    return room if room >= _NARROW else LINE
 
 
 def _cut(line: Content, room: int, glyphs: Glyphs) -> Content:

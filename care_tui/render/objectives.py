@@ -138,7 +138,7 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
 
 def damage(part: Damage) -> str:
     """What is broken, and where."""
-    return part.what + place_of_damage(part.what, part.byte, part.time_s)
+    return part.what + place_of_damage(part.what, part.byte, part.time_s, seconds)
 
 
 def evidence_row(part: Evidence, option: str = "") -> Row:
