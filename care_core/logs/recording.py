@@ -89,7 +89,8 @@ def _in_folder(folder: Path) -> Recording:
             hint="Copy them beside metadata.yaml.",
             where=str(folder),
         )
-    hint = _one_or_all(folder) if any(is_log(folder / name) for name in names) else "Name a log file."
+    holds_logs = any(is_log(folder / name) for name in names)
+    hint = _one_or_all(folder) if holds_logs else "No log lies right in it; name a log file."
     raise LogError("A folder, not a log.", hint=hint, where=str(folder))
 
 

@@ -67,7 +67,7 @@ def test_a_folder_without_a_log_is_not_sent_to_triage_again(tmp_path: Path) -> N
     (tmp_path / "notes.txt").write_text("no log")
     with pytest.raises(LogError, match="A folder, not a log") as caught:
         open_log(tmp_path)
-    assert caught.value.hint == "Name a log file."
+    assert caught.value.hint == "No log lies right in it; name a log file."
 
 
 def test_digest_of_a_folder(tmp_path: Path) -> None:
