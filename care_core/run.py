@@ -69,7 +69,7 @@ def place_of_damage(what: str, byte: int | None, time_s: float | None, told: Cal
         told: how a time is written.
     """
     at = "" if byte is None or f"at byte {byte}" in what else f" at byte {byte}"
-    is_told = time_s is None or f"to {log_time(time_s)}" in what
+    is_told = time_s is None or f"read to {log_time(time_s)}" in what
     return at if is_told or time_s is None else f"{at}, at {told(time_s)}"
 
 

@@ -216,6 +216,10 @@ def test_a_label_that_is_wider_than_its_column_does_not_run_into_its_text() -> N
     [
         (Damage("a packet has a wrong checksum", 12, 3.5), "a packet has a wrong checksum at byte 12, at 3.5 s"),
         (Damage("a line's time is impossible", 12), "a line's time is impossible at byte 12"),
+        (
+            Damage("sorted by time: up to 2.0 s out of order", None, 2.0),
+            "sorted by time: up to 2.0 s out of order, at 2.0 s",
+        ),
         (Damage("read to 3.5 s, cut at byte 12: cut short", 12, 3.5), "read to 3.5 s, cut at byte 12: cut short"),
     ],
 )
