@@ -55,7 +55,8 @@ def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle, settings: Setting
     elif not coverage.found:
         yield "none of its parameters or sources are in the log"
     elif coverage.sources < LEAST * coverage.sources_wanted:
-        yield f"only {coverage.sources} of the {coverage.sources_wanted} messages that it reads are in the log"
+        verb = "is" if coverage.sources == 1 else "are"
+        yield f"only {coverage.sources} of the {coverage.sources_wanted} messages that it reads {verb} in the log"
 
 
 def _other_plugin(schema: Schema, settings: Settings) -> str:

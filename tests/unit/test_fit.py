@@ -67,3 +67,10 @@ def test_what_ros_2_misses_is_recorded_on_the_topic_of_all_nodes(log_path: Path)
     hints = {one.variable.name: one.hint for one in try_on(open_log(log_path), load_profile("nav2").schema).missed}
     assert "record /parameter_events, or " in hints["inflation_radius_global"]
     assert not any("parameter_updates" in hint for hint in hints.values())
+
+
+@pytest.mark.parametrize(("count", "verb"), [(1, "is"), (2, "are")])
+def test_few_messages_are_counted_as_one_speaks(log_path: Path, count: int, verb: str) -> None:
+    log, schema = open_log(log_path), load_profile("nav2").schema
+    few = replace(cover(log, schema), sources=count, sources_wanted=10)
+    assert f"only {count} of the 10 messages that it reads {verb} in the log" in fit_of(log, few).reasons
