@@ -115,14 +115,15 @@ def test_a_plane_may_land_above_home() -> None:
     assert judged(PLANE, 10)["mission_success"] == 1.0
 
 
-def test_a_failsafe_a_crash_and_a_forced_disarm_are_faults_of_any_vehicle() -> None:
-    found = judged(
-        ROVER,
-        0,
-        ERR=table([(50.0, 17, 1), (60.0, 12, 1)], "Subsys", "ECode"),
-        ARM=table([(10.0, 1, 0), (70.0, 0, 1)], "ArmState", "Forced"),
-    )
-    assert (found["no_failsafe"], found["no_crash"], found["disarmed"]) == (0.0, 0.0, 0.0)
+def test_a_failsafe_and_a_crash_are_faults_of_any_vehicle() -> None:
+    found = judged(ROVER, 0, ERR=table([(50.0, 17, 1), (60.0, 12, 1)], "Subsys", "ECode"))
+    assert (found["no_failsafe"], found["no_crash"]) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("facts", "mode", "is_fault"), [(PLANE, 5, True), (ROVER, 0, False)])
+def test_a_forced_disarm_is_a_fault_of_what_can_fall(facts: Mapping[str, str], mode: int, *, is_fault: bool) -> None:
+    found = judged(facts, mode, ARM=table([(10.0, 1, 0), (45.0, 0, 1)], "ArmState", "Forced"))
+    assert (found["disarmed"] == 0.0) is is_fault
 
 
 def test_a_refusal_is_a_fault_only_where_somebody_asked_to_arm() -> None:

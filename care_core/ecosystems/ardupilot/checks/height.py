@@ -16,10 +16,11 @@ from care_core.ecosystems.ardupilot.spans import Floats, Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.logs.base import Wanted
+from care_core.logs.base import Table, Wanted
 from care_core.numbers import median, quantile
 
-READS: Wanted = {"IMU": ("AccX", "AccY", "AccZ"), "GPS": ("Alt", "Status")}
+_AXES = ("AccX", "AccY", "AccZ")
+READS: Wanted = {"IMU": _AXES, "GPS": ("Alt", "Status")}
 
 LIMITS = Limits()
 _APART_M = LIMITS.add("estimate off the barometer", 5.0, "m", "five times what arming allows")
@@ -54,17 +55,17 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def _not_gravity(flight: Flight) -> Iterator[Finding]:
     """Accelerometers that are far off gravity at rest: every climb rate that is estimated from them is wrong, though
-    the barometer holds the height within its limit."""
+    the barometer holds the height within its limit. Where one of several feels it, the others disagree with that."""
     felt = _felt_at_rest(flight)
-    if felt is not None and abs(felt - _GRAVITY) > _FAR_OFF:
+    if felt and abs(felt[0] - _GRAVITY) > _FAR_OFF and all(abs(one - _GRAVITY) > _OFF for one in felt):
         yield Finding(
             kind="imu",
             title="the accelerometers do not feel gravity at rest",
             onset_s=flight.armed[0][0],
             end_s=flight.end_s,
             severity="warning",
-            evidence=f"{felt:.1f} m/s^2 before take-off, gravity is {_GRAVITY:g} (limit {_FAR_OFF:g} off): calibrate "
-            "them",
+            evidence=f"{felt[0]:.1f} m/s^2 before take-off, gravity is {_GRAVITY:g} (limit {_FAR_OFF:g} off): "
+            "calibrate them",
             source="IMU.AccX, AccY, AccZ before the throttle is raised",
             probability=_TRUE,
             mission_lost=_LOST,
@@ -125,21 +126,27 @@ def _holds_height(flight: Flight, start: float, end: float) -> bool:
 def _at_rest(flight: Flight) -> str:
     """That the accelerometers do not feel gravity before take-off, in a clause; empty where they do."""
     felt = _felt_at_rest(flight)
-    if felt is None or abs(felt - _GRAVITY) < _OFF:
+    if not felt or abs(felt[0] - _GRAVITY) < _OFF:
         return ""
-    return f"; at rest the accelerometers feel {felt:.1f} m/s^2, gravity is {_GRAVITY:g}: calibrate them"
+    return f"; at rest the accelerometers feel {felt[0]:.1f} m/s^2, gravity is {_GRAVITY:g}: calibrate them"
 
 
-def _felt_at_rest(flight: Flight) -> float | None:
-    """What the accelerometers feel before the throttle is raised, m/s^2; None where too little is recorded of that."""
-    table, driven = flight.one("IMU", "AccX", "AccY", "AccZ"), flight.throttle
-    if table is None or driven is None:
-        return None
+def _felt_at_rest(flight: Flight) -> list[float]:
+    """What each sensor's accelerometers feel before the throttle is raised, m/s^2, the first one's first; none where
+    too little of that is recorded of it."""
+    driven, first = flight.throttle, flight.one("IMU", *_AXES)
+    if driven is None or first is None:
+        return []
     lifted = driven[0][driven[1] > _REST]
-    still = table.t < (lifted[0] if len(lifted) else np.inf)
-    if still.sum() < _FEWEST:
+    until = lifted[0] if len(lifted) else np.inf
+    felt = [_felt(table.where(table.t < until)) for table in (first, *flight.all("IMU", *_AXES)[1:])]
+    return [] if felt[0] is None else [one for one in felt if one is not None]
+
+
+def _felt(standing: Table) -> float | None:
+    if len(standing) < _FEWEST:
         return None
-    return float(median(np.sqrt(sum(table[axis][still] ** 2 for axis in ("AccX", "AccY", "AccZ")))))
+    return float(median(np.sqrt(sum(standing[axis] ** 2 for axis in _AXES))))
 
 
 CHECK = Check("height", "an estimated height that runs away from the barometer's", READS, LIMITS, find)
