@@ -59,7 +59,7 @@ WALK = (
     Step(("f",), "# Triage", "Markdown for the ticket."),
     Step(("Enter",), "Write the report to", "Where to? The name that is offered will do."),
     Step(("Enter",), "written to", "Written."),
-    Step(("?",), "Keys that work here", "At any time: which keys work here?"),
+    Step(("?",), "Help and keys", "At any time: which keys work here?"),
     Step(("Escape", "q"), "$", "Back in the shell. The exit code is 1, for a fault was found."),
     Step(("echo $?; head -5 *.md", "Enter"), "# Triage", "The report is there."),
 )
