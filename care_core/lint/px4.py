@@ -12,7 +12,9 @@ from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import px4
 from care_core.metadata.fact import Fact
 
-_VERSION = re.compile(r"^#\s*(?:Version:|Firmware: PX4)\s*v?(\d+\.\d+)", re.MULTILINE)
+_VERSION = re.compile(r"^#\s*(?:Version:|Firmware: PX4)\s*v?(\d+\.\d+)(?P<build>.*)", re.MULTILINE)
+_EARLY = re.compile(r"alpha|beta|rc|dev", re.IGNORECASE)
+"""Builds before a release: they still have what it leaves out."""
 _LISTS = f"{px4.SOURCE}s of {px4.RELEASES[0]} to {px4.RELEASES[-1]}"
 _TRANSLATED = "param_translation.cpp of PX4, which translates files of older releases"
 _FAR = 2.0
@@ -27,24 +29,26 @@ def releases_of(file: ConfigFile, target: str) -> tuple[tuple[str, ...], bool]:
     Args:
         target: what the operator says: `px4-1.15`; empty where nothing is said.
     """
-    told = target.partition("-")[2] if target else _header(file.text)
+    told, is_early = (target.partition("-")[2], False) if target else _header(file.text)
     if told in px4.RELEASES:
-        return (told,), True
+        place = px4.RELEASES.index(told)
+        return px4.RELEASES[max(place - is_early, 0) : place + 1], True
     counts = Counter(release for entry in file.entries for release in px4.known_in(entry.name))
     most = max(counts.values(), default=0)
     return tuple(release for release in px4.RELEASES if counts[release] == most), False
 
 
-def _header(text: str) -> str:
-    """The release that QGroundControl, or `care params`, writes above the parameters."""
+def _header(text: str) -> tuple[str, bool]:
+    """The release that QGroundControl, or `care params`, writes above the parameters, and whether it is a build before
+    it."""
     match = _VERSION.search(text)
-    return match[1] if match else ""
+    return (match[1], bool(_EARLY.search(match["build"]))) if match else ("", False)
 
 
 def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of PX4's parameters."""
     releases, is_told = releases_of(file, target)
-    is_newer = not target and _number(_header(file.text)) > _number(px4.RELEASES[-1])
+    is_newer = not target and _number(_header(file.text)[0]) > _number(px4.RELEASES[-1])
     for entry in file.entries:
         known = px4.known_in(entry.name)
         if not known:

@@ -9,7 +9,7 @@ from pathlib import Path
 from care_core.errors import LogError
 from care_core.files import read_small_text
 from care_core.folders import files_in, may_list
-from care_core.logs.finding import is_log
+from care_core.logs.formats import log_suffixes
 from care_core.logs.ros_log import Flaw
 from care_core.logs.ros_metadata import FILE_NAME, PARAMETERS_NAME, Metadata, parse_metadata
 from care_core.records import Record, field, replace
@@ -89,7 +89,7 @@ def _in_folder(folder: Path) -> Recording:
             hint="Copy them beside metadata.yaml.",
             where=str(folder),
         )
-    holds_logs = any(is_log(folder / name) for name in names)
+    holds_logs = any(Path(name).suffix.lower() in log_suffixes() for name in names)
     hint = _one_or_all(folder) if holds_logs else "No log lies right in it; name a log file."
     raise LogError("A folder, not a log.", hint=hint, where=str(folder))
 
