@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
@@ -88,7 +89,7 @@ def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[str], *, is_to
 def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
     """A value that no release that the file may be for documents; the default of one always is."""
     value = entry.number
-    if value is None or any(value == fact.default_number for fact in facts):
+    if value is None or math.isnan(value) or any(value == fact.default_number for fact in facts):
         return
     fact, unit = facts[-1], f" {facts[-1].unit}" if facts[-1].unit else ""
     if all(one.type in ("int", "bool") for one in facts) and not value.is_integer():

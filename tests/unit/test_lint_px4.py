@@ -70,6 +70,10 @@ def test_defaults_calibration_and_what_is_as_documented_raise_nothing(tmp_path: 
     assert told(tmp_path, {**fine, "SER_TEL1_BAUD": 57600.0, "COM_FLTMODE1": -1.0}) == []
 
 
+def test_what_is_no_number_is_told_once(tmp_path: Path) -> None:
+    assert told(tmp_path, {"MC_ROLLRATE_P": float("nan")}) == [("wrong-type", "error")]
+
+
 def test_the_release_comes_from_the_header_the_operator_or_the_names(tmp_path: Path) -> None:
     old = {"MPC_LAND_SPEED": 0.7, "SYS_USE_IO": 1.0, "MC_AIRMODE": 0.0}
     assert told(tmp_path, old, "1.13.3") == []
