@@ -102,7 +102,10 @@ class ObjectivesPage(ProvenPage):
 
     def _has_figure(self, index: int | None) -> bool:
         """Whether the figure has a pane of its own."""
-        return index is not None and self.is_wide and bool(self._figure(index, 0))
+        if index is None or not self.is_wide:
+            return False
+        result = self.session.diagnosis.objectives[index]
+        return self.has_figure(result.name, result)
 
     def beside(self) -> list[Row]:
         """How it was judged, beside the figure."""

@@ -42,6 +42,12 @@ def figure_of(case: Case, signal: Signal, proof: Proof, span: tuple[float, float
     )
 
 
+def has_proof(page: Page, name: str, subject: Subject, width: int, height: int) -> bool:
+    """Whether something proves a subject, or may: it is still looked for. Arguments as for `proof_rows`."""
+    found, is_open = _proof(page, name, subject, width, height)
+    return found is not None or is_open
+
+
 def proof_rows(page: Page, name: str, subject: Subject, width: int, height: int) -> list[Row]:
     """What proves a subject, drawn when a thread has read it: the way where it is a matter of the way, else a signal
     over time; nothing where neither shows it.
@@ -49,9 +55,19 @@ def proof_rows(page: Page, name: str, subject: Subject, width: int, height: int)
     Args:
         name: tells the subject from others of this page.
     """
+    found, is_open = _proof(page, name, subject, width, height)
+    if isinstance(found, Way):
+        return _drawn(page, found, width, height)
+    if found is not None:
+        return found.rows(width, height, page.glyphs)
+    return [Row(Content("Looking for what shows it..."))] if is_open else []
+
+
+def _proof(page: Page, name: str, subject: Subject, width: int, height: int) -> tuple[Figure | Way | None, bool]:
+    """What proves a subject, and whether it is still looked for."""
     case, session = page.session.case, page.session
     if case is None or case.log is None or height < LEAST:
-        return []
+        return None, False
     columns = dots_across(max(width - AXIS, 10), ascii=page.glyphs is ASCII)
 
     def work() -> Figure | Way | None:
@@ -70,11 +86,8 @@ def proof_rows(page: Page, name: str, subject: Subject, width: int, height: int)
 
     question = f"proof {name} {columns} {height >= LEAST_MAP}"
     answer = page.fetched(question, work)
-    if isinstance(answer, Way):
-        return _drawn(page, answer, width, height)
-    if isinstance(answer, Figure):
-        return answer.rows(width, height, page.glyphs)
-    return [] if page.has_answer(question) else [Row(Content("Looking for what shows it..."))]
+    found = None if isinstance(answer, CareError) else answer
+    return found, not page.has_answer(question)
 
 
 def place_rows(page: Page, moment_s: float, width: int, height: int) -> list[Row]:

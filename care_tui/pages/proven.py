@@ -12,7 +12,7 @@ from textual.content import Content
 
 from care_core.application.proof import Subject
 from care_tui.pages.diagnosis import DiagnosisPage
-from care_tui.pages.proofs import proof_rows
+from care_tui.pages.proofs import has_proof, proof_rows
 from care_tui.render.rows import Row, Rows
 from care_tui.widgets.choices import Choices
 from care_tui.widgets.reader import Reader
@@ -53,12 +53,19 @@ class ProvenPage(DiagnosisPage):
         """
         if not self.reader.has_room:  # it is asked again when there is some
             return []
+        width, height = self._room(around)
+        rows = proof_rows(self, name, subject, width, height)
+        return [*rows, Row(Content())] if rows and not self.is_wide else rows
+
+    def has_figure(self, name: str, subject: Subject) -> bool:
+        """Whether a subject has a proof that can be drawn in the whole pane, or one may be found."""
+        return self.reader.has_room and has_proof(self, name, subject, *self._room(0))
+
+    def _room(self, around: int) -> tuple[int, int]:
+        """Cells and lines of a figure beside so many lines of text."""
         room = self.reader.room
         height = max(room.height - around, LEAST_FIGURE)
-        if self.is_wide:
-            return proof_rows(self, name, subject, room.width, height)
-        rows = proof_rows(self, name, subject, room.width, min(height, FIGURE))
-        return [*rows, Row(Content())] if rows else []
+        return room.width, height if self.is_wide else min(height, FIGURE)
 
     def height(self, rows: list[Row]) -> int:
         """Lines that rows take."""

@@ -94,8 +94,8 @@ def drawn_while_lifting(flight: Px4Flight) -> float | None:
 
 def _unpowered(flight: Px4Flight, lacking: Finding, drawn_w: float) -> Finding:
     """Thrust that does not come because nothing drives the propellers: no failure where somebody broke it off."""
-    span = next(one for one in flight.armed if one[0] <= lacking.onset_s <= one[1])
-    by_hand = way_of("px4", flight.modes_during(span)[-1]) == "manual"
+    span = next((one for one in flight.armed if one[0] <= lacking.onset_s <= one[1]), (lacking.onset_s, lacking.end_s))
+    by_hand = [way_of("px4", mode) for mode in flight.modes_during(span)][-1:] == ["manual"]
     return replace(
         lacking,
         title=UNPOWERED,
