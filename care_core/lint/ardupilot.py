@@ -8,7 +8,8 @@ from collections.abc import Collection, Iterator, Sequence
 
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Kind
-from care_core.lint.generic import meant_instead, problem_at
+from care_core.lint.documented import meant_instead, not_listed, share_known, unknown_bits
+from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import ardupilot
 from care_core.metadata.aliases import aliases_of
@@ -140,13 +141,9 @@ def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Pr
     elif all(_is_enumeration(one) for one in facts):
         ever = {code for one in ardupilot.facts_of(entry.name) for code, _ in one.values}
         if value not in {*ever, 0.0, -1.0} and not (value in _SIMULATED and entry.name.endswith("_TYPE")):
-            text = f"{entry.name} is {value:g}, which is none of the values of {fact.source}."
-            yield problem_at("not-in-values", Severity.WARNING, file, entry, text, _listed(fact), fact.source)
-    elif all(one.bits for one in facts) and value > 0 and value.is_integer():
-        unknown = [bit for bit in range(32) if int(value) >> bit & 1 and not any(bit in one.bits for one in facts)]
-        if unknown:
-            text = f"{entry.name} is {value:g}: bit {', '.join(map(str, unknown))} means nothing to {fact.source}."
-            yield problem_at("not-in-values", Severity.NOTE, file, entry, text, "", fact.source)
+            yield not_listed(file, entry, value, fact)
+    elif all(one.bits for one in facts):
+        yield from unknown_bits(file, entry, value, facts)
 
 
 def _is_enumeration(fact: Fact) -> bool:
@@ -185,11 +182,6 @@ def _outside(file: ConfigFile, entry: Entry, value: float, facts: Sequence[Fact]
     yield problem_at("out-of-range", Severity.NOTE, file, entry, text, "The range is what is usual.", fact.source)
 
 
-def _listed(fact: Fact) -> str:
-    codes = [f"{code:g}" for code, _ in fact.values]
-    return f"They are {', '.join(codes[:12])}{', ...' if len(codes) > 12 else ''}."
-
-
 def known(names: Collection[str]) -> float:
     """The share of these that are ArduPilot's parameters: it has few names in common with PX4."""
-    return sum(bool(ardupilot.known_in(name)) for name in names) / max(len(names), 1)
+    return share_known(names, ardupilot.known_in)

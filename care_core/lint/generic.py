@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Container, Iterable, Iterator
-from difflib import get_close_matches
+from collections.abc import Iterator
 
 from care_core.configs.driven import same_value
 from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import BY_ID
 from care_core.run import shown
-
-_ALIKE = 0.84
-"""Least likeness of a name to the one that is meant, of difflib: one letter off in names of seven and more."""
 
 
 def problem_at(
@@ -30,15 +25,6 @@ def problem_at(
     """A problem at an entry; `source` where it is not the rule's own."""
     where = (file.path, entry.line, entry.column, entry.name)
     return Problem(rule, severity, *where, text, hint, source or BY_ID[rule].source, others)
-
-
-def meant_instead(name: str, held: Container[str], known: Iterable[str]) -> str:
-    """The parameter of a vehicle that an unknown name is a slip of the pen for, with the same numbers in it; empty
-    where none is alike, or the file holds it as well."""
-    like = [one for one in known if one[:1] == name[:1] and abs(len(one) - len(name)) <= 2]
-    close = get_close_matches(name, like, n=3, cutoff=_ALIKE)
-    numbers = re.findall(r"\d+", name)
-    return next((one for one in close if one not in held and re.findall(r"\d+", one) == numbers), "")
 
 
 def check(file: ConfigFile) -> Iterator[Problem]:

@@ -8,7 +8,8 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 
 from care_core.ecosystems.vehicles.self_written import is_self_written
-from care_core.lint.generic import meant_instead, problem_at
+from care_core.lint.documented import meant_instead, not_listed, share_known, unknown_bits
+from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import px4
 from care_core.metadata.fact import Fact
@@ -96,24 +97,15 @@ def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Pr
         text = f"{entry.name} is {value:g}, and PX4 counts it in whole numbers."
         yield problem_at("wrong-type", Severity.WARNING, file, entry, text, "", fact.source)
     elif all(one.bits for one in facts):
-        yield from _bits(file, entry, int(value), facts)
+        yield from unknown_bits(file, entry, value, facts)
     elif all(one.values for one in facts):
         if not any(value == code for one in facts for code, _ in one.values):
-            text = f"{entry.name} is {value:g}, which is none of the values of {fact.source}."
-            yield problem_at("not-in-values", Severity.WARNING, file, entry, text, _listed(fact), fact.source)
+            yield not_listed(file, entry, value, fact)
     elif not any(_within(value, one) for one in facts):
         severity = Severity.WARNING if all(_is_far(value, one) for one in facts) else Severity.NOTE
         text = f"{entry.name} is {value:g}{unit}, outside {_range(fact)}."
         hint = "The firmware takes it all the same."
         yield problem_at("out-of-range", severity, file, entry, text, hint, fact.source)
-
-
-def _bits(file: ConfigFile, entry: Entry, value: int, facts: Sequence[Fact]) -> Iterator[Problem]:
-    known = frozenset().union(*(fact.bits for fact in facts))
-    unknown = [bit for bit in range(32) if value >> bit & 1 and bit not in known] if value > 0 else []
-    if unknown:
-        text = f"{entry.name} is {value}: bit {', '.join(map(str, unknown))} means nothing to {facts[-1].source}."
-        yield problem_at("not-in-values", Severity.NOTE, file, entry, text, "", facts[-1].source)
 
 
 def _within(value: float, fact: Fact) -> bool:
@@ -136,11 +128,6 @@ def _range(fact: Fact) -> str:
     return f"up to {fact.high:g}" if fact.low is None else f"{fact.low:g} to {fact.high:g}"
 
 
-def _listed(fact: Fact) -> str:
-    listed = [f"{code:g}" for code, _ in fact.values]
-    return f"They are {', '.join(listed[:12])}{', ...' if len(listed) > 12 else ''}."
-
-
 def known(names: Collection[str]) -> float:
     """The share of these that are PX4's parameters."""
-    return sum(bool(px4.known_in(name)) for name in names) / max(len(names), 1)
+    return share_known(names, px4.known_in)
