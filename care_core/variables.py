@@ -249,6 +249,19 @@ class Variable(Record):
             return float(round(value))
         return float(f"{value:.4g}")
 
+    def across(self, count: int) -> tuple[float, ...]:
+        """About so many acceptable values from one end of the range to the other, even on its scale; every code
+        of an enum, and none where nothing bounds them."""
+        if self.labels:
+            return tuple(sorted(code for code, _ in self.labels))
+        low, high = (0.0, 1.0) if self.type == "bool" else self.range or (0.0, 0.0)
+        if low == high:
+            return ()
+        shares = (step / (count - 1) for step in range(count))
+        if self.is_log_scaled:
+            return tuple(sorted({self.snap(low * (high / low) ** share) for share in shares}))
+        return tuple(sorted({self.snap(low + (high - low) * share) for share in shares}))
+
     @property
     def is_log_scaled(self) -> bool:
         """Whether a change is better judged as a ratio: a positive range over more than a decade."""

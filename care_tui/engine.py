@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, open_case, predict
+from care_core.application.case import Case, Odds, Progress, Request, odds_over, open_case, predict
 from care_core.application.configuring import DiffSide, apply_to_files, commands_of, diff_of, doubts_of
 from care_core.application.history_writing import remember, remember_triage
 from care_core.application.reporting import report_of
@@ -18,6 +18,7 @@ from care_core.report.formats import FORMATS, Format
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.report.document import TriageDocument
+    from care_core.variables import Variable
 
 _ESCAPES = re.compile(r"\\([!-/:-@\[-`{-~])")
 """A sign that Markdown is told to leave as it is."""
@@ -78,6 +79,7 @@ class Engine(Record):
 
     diagnose: Callable[[Request, Progress], Case] = open_and_warm
     predict: Callable[[Case, Mapping[str, float]], Fix] = predict
+    odds_over: Callable[[Case, Variable, Mapping[str, float]], Iterator[Odds]] = odds_over
     diff: Callable[[Case, Fix, DiffSide], str] = diff_of
     report: Callable[[Case, str], str] = report_of
     preview: Callable[[Case, Format], str] = preview_of

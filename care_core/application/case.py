@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from care_core.diagnose.judging import Judged
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.reference import Good
+    from care_core.diagnose.whatif import Question
     from care_core.ecosystems.base import RunModel
     from care_core.ecosystems.findings import Health
     from care_core.ecosystems.ros.drive import Drive
@@ -35,6 +36,15 @@ if TYPE_CHECKING:
 NOTHING: Settings = MappingProxyType({})
 Progress = Callable[[str, float], None]
 """Is told the step and the share that is done, 0 to 1."""
+
+
+class Odds(Record):
+    """How likely every objective is met with an option at a value."""
+
+    value: float
+    p_ok: float
+    is_guess: bool
+    """Whether no training run came near the changes."""
 
 
 class Request(Record):
@@ -455,8 +465,7 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     failed part or what the run met explains is taken off, as for the suggestion."""
     from care_core.diagnose.records import Fix
 
-    if case.reading is None:
-        raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
+    question = _question(case)
     advised, options = case.diagnosis.fix, {option.name for option in case.options}
     if advised is not None and dict(changes) == changes_of(advised) and (advised.shown_by or changes.keys() - options):
         return advised
@@ -466,7 +475,25 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
             f"What {', '.join(strange)} does {where} is not known: no profile models it.",
             hint="Take the suggestion (s), or untick it.",
         )
-    answer = replace(case.reading.question, failure=case.diagnosis.failure).ask(changes)
+    answer = question.ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
     by_hand = bool(changes) and all(changes_of(one) != changes for one in fixes(case.diagnosis))
     return Fix(answer.changes, answer.p_ok, predicted, by_hand=by_hand)
+
+
+def odds_over(case: Case, option: Variable, beside: Mapping[str, float]) -> Iterator[Odds]:
+    """The odds that every objective is met by the value of one option, across its range and beside other changes; none
+    where the profile does not model what is changed."""
+    modelled = {one.name for one in case.options}
+    if option.name not in modelled or beside.keys() - modelled:
+        return
+    others = {name: value for name, value in beside.items() if name != option.name}
+    for value, answer in _question(case).over(option.name, others):
+        yield Odds(value, answer.p_ok, answer.is_guess)
+
+
+def _question(case: Case) -> Question:
+    """What a run can be asked. Raises CareError where there is no model of it."""
+    if case.reading is None:
+        raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
+    return replace(case.reading.question, failure=case.diagnosis.failure)

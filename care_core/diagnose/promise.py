@@ -68,7 +68,8 @@ class Promise(Record, eq=False):
         return max(shares)
 
     def _changed(self, config: Config) -> frozenset[Key]:
-        """The causes that a configuration takes away: options on their way back, none that goes farther off."""
+        """The causes that a configuration takes away: options on their way back or past the reference, where the
+        mechanisms tell what too much does, none that goes farther off."""
         driven = self.query.config
         names = (name for name in driven if not same_value(config.get(name, driven[name]), driven[name]))
         return frozenset(("parameter", name) for name in names if self._goes_back(name, config[name]))
@@ -77,7 +78,9 @@ class Promise(Record, eq=False):
         option, reference = self.query.variables.get(name), self.query.reference.get(name)
         if option is None or reference is None or option.labels or option.type == "bool":
             return True
-        return option.distance(value, reference) < option.distance(self.query.config[name], reference)
+        driven = self.query.config[name]
+        is_past = (value - reference) * (driven - reference) < 0
+        return is_past or option.distance(value, reference) < option.distance(driven, reference)
 
     def _pooled(self, configs: Sequence[Config], gone: Sequence[frozenset[Key]]) -> FloatArray:
         options = {("parameter", name) for name in self.query.config}

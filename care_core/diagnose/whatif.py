@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.kernel import FloatArray
@@ -22,6 +22,8 @@ from care_core.records import Record
 from care_core.run import ProfileChoice, Run, Setting
 from care_core.variables import Change, Role, Variable
 
+ACROSS = 24
+"""Values of one option that are asked for, from one end of its range to the other."""
 NO_MISSION_HINT = "Ask with the log of a mission, or with another flight of this one: --mission N."
 
 
@@ -89,6 +91,14 @@ class Question(Record, eq=False):
             p_ok=min(float(then), least),
             p_ok_now=float(now),
         )
+
+    def over(self, name: str, beside: Mapping[str, float]) -> Iterator[tuple[float, Answer]]:
+        """The predictions for values of one option across its range, those of this run and of its reference among them,
+        beside other changes."""
+        option, query = self.schema.variables[name], self.query
+        known = (query.config.get(name), query.reference.get(name))
+        for value in sorted({*option.across(ACROSS), *(value for value in known if value is not None)}):
+            yield value, self.ask({**beside, name: value})
 
     def _odds(self, configs: Sequence[Config]) -> FloatArray:
         """Probability that every objective is met: of a run that failed as its report promises it."""

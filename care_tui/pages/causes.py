@@ -13,8 +13,9 @@ from care_core.ecosystems.findings import Finding, every_finding
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.messages import Decided
+from care_tui.pages.figured import LEAST_FIGURE
 from care_tui.pages.page import View, enter_to
-from care_tui.pages.proven import LEAST_FIGURE, ProvenPage
+from care_tui.pages.proven import ProvenPage
 from care_tui.render.causes import (
     cause_item,
     doubt_rows,
@@ -46,7 +47,6 @@ class Explanation(NamedTuple):
 class CausesPage(ProvenPage):
     NAME = "causes"
     NOTHING = "no cause is named"
-    BESIDE = "Path and fix"
     HELP = (
         "What explains the fault, the likeliest first, with what this run shows of it, and the path that led to the "
         "fault. p opens the proof as a plot, z the statistics behind it. d sets a cause aside with a reason that "
@@ -230,6 +230,9 @@ class CausesPage(ProvenPage):
         first = [labelled("Seen by", finding.evidence)] if finding.evidence else []
         figure = self.figure(finding.title, finding, self.height(first))
         return Rows([*first, *figure, *(() if self.is_wide else rows)])
+
+    def beside_title(self) -> str:
+        return "Path and fix"
 
     def beside(self) -> list[Row]:
         """The path of a cause and what its change brings, or all about a finding."""

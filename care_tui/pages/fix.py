@@ -1,4 +1,5 @@
-"""Step 4: the changes as a basket of boxes, with the odds and the objectives they are predicted to bring."""
+"""Step 4: the changes as a basket of boxes, with the odds and the objectives they are predicted to bring, and how the
+odds answer to the value of the parameter under the cursor."""
 
 from __future__ import annotations
 
@@ -6,25 +7,31 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.content import Content
+from textual.worker import get_current_worker
 
-from care_core.application.case import changes_of, fixes
+from care_core.application.case import Odds, changes_of, fixes
 from care_core.diagnose.records import Fix
 from care_core.text import clean, number_of
 from care_core.variables import Variable
 from care_tui.basket import nudged, parsed, possible
+from care_tui.engine import CancelledError
 from care_tui.messages import Decided
-from care_tui.pages.diagnosis import DiagnosisPage
+from care_tui.pages.figured import FiguredPage
 from care_tui.pages.page import View, enter_to
 from care_tui.render.fix import no_fix_rows, option_item, option_rows, outcome_rows
+from care_tui.render.response import response_rows
 from care_tui.render.rows import Row, Rows, error_rows, warning
 from care_tui.screens.prompt import Prompt
 from care_tui.widgets.choices import Listing
+from care_tui.workspace import Workspace
 
 NAME_WIDTH = 26
-UNCHANGED = "unchanged"
+UNCHANGED, RESPONSE = "unchanged", "response"
+Key = tuple[str, frozenset[tuple[str, float]]]
+"""An option, and the changes beside which its values are asked for."""
 
 
-class FixPage(DiagnosisPage):
+class FixPage(FiguredPage):
     NAME = "fix"
     NOTHING = "no change is suggested"
     HELP = (
@@ -45,6 +52,12 @@ class FixPage(DiagnosisPage):
         Binding("u", "undo", "Undo", show=False, id="fix.undo"),
     ]
 
+    def __init__(self, workspace: Workspace, *, id: str | None = None) -> None:
+        super().__init__(workspace, id=id)
+        self._responses: dict[Key, list[Odds]] = {}
+        self._weighed: Key | None = None
+        """What the thread is at that asks for the odds over an option's values."""
+
     def enter(self) -> None:
         case, session = self.session.case, self.session
         if self.has_content and case is not None and session.unchanged is None:
@@ -54,7 +67,13 @@ class FixPage(DiagnosisPage):
         if question == UNCHANGED and isinstance(answer, Fix):  # without it the odds stand alone, which is no failure
             self.session.unchanged = answer
             self.post_message(Decided(has_changed_fix=False))
-        super().take(question, answer)
+        if question == RESPONSE:
+            if self._weighed is not None:
+                self._responses[self._weighed] = answer if isinstance(answer, list) else []
+            self._weighed = None
+            self.show_text(from_top=False)
+        else:
+            super().take(question, answer)
 
     def view_of_diagnosis(self) -> View:
         session, basket, glyphs = self.session, self.session.basket, self.glyphs
@@ -71,8 +90,12 @@ class FixPage(DiagnosisPage):
 
         index, session.option = self._place(options), None
         listing = Listing(len(options), item, lambda i: f"{options[i].name} {options[i].doc}")
-        about = f"Predicted {'with what is ticked' if basket.ticked else 'as driven'}, with 80 % intervals"
+        has_figure = self._has_figure(self.option_here())
+        about = "What each value brings" if has_figure else self.beside_title()
         return View(self._title(), lambda i: self._detail(None if i is None else options[i]), listing, index, about)
+
+    def beside_title(self) -> str:
+        return f"Predicted {'with what is ticked' if self.session.basket.ticked else 'as driven'} (80 % intervals)"
 
     def _place(self, options: list[Variable]) -> int | None:
         names = [option.name for option in options]
@@ -86,9 +109,19 @@ class FixPage(DiagnosisPage):
         return Content(f"What to change: {ticked}")
 
     def _detail(self, option: Variable | None) -> Rows:
+        if option is not None and self._has_figure(option):
+            return Rows(self._figure(option))
+        return Rows(self._predicted(option))
+
+    def beside(self) -> list[Row]:
+        option = self.option_here()
+        return self._predicted(option) if self._has_figure(option) else []
+
+    def _predicted(self, option: Variable | None) -> list[Row]:
+        """What is predicted of the ticked changes, and what has to be known of an option."""
         session = self.session
         if session.fix_error is not None:
-            return error_rows(session.fix_error)
+            return list(error_rows(session.fix_error).rows)
         rows: list[Row] = []
         ticked = session.basket.ticked
         if session.diagnosis.fix is None:
@@ -101,7 +134,51 @@ class FixPage(DiagnosisPage):
             rows += [warning("Unless", f"it happens again: {title}") for title in session.diagnosis.lost_by]
         if option is not None:
             rows += [Row(Content()), *option_rows(option, self._caveats(option), self.glyphs)]
-        return Rows(rows)
+        return rows
+
+    # The odds over the values of the option under the cursor
+
+    def _key(self, option: Variable) -> Key:
+        beside = {name: value for name, value in self.session.basket.ticked.items() if name != option.name}
+        return option.name, frozenset(beside.items())
+
+    def _has_figure(self, option: Variable | None) -> bool:
+        """Whether the odds over an option's values have a pane of their own."""
+        case = self.session.case
+        if option is None or case is None or case.reading is None or not self.is_wide or not self.reader.has_room:
+            return False
+        return bool(option.across(2)) and self._responses.get(self._key(option)) != []
+
+    def _figure(self, option: Variable) -> list[Row]:
+        odds = self._responses.get(self._key(option))
+        if odds is None:
+            self._weigh(option)
+            return [Row(Content("Asking what each value would bring..."))]
+        room = self.room_of_figure()
+        return response_rows(option, odds, self._marks(option), room.width, room.height, self.glyphs)
+
+    def _marks(self, option: Variable) -> dict[float, str]:
+        session = self.session
+        marks = {session.reference(option): "reference", session.current(option): "as driven"}
+        marks[session.basket.ticked.get(option.name)] = "ticked"
+        return {value: what for value, what in marks.items() if value is not None}
+
+    def _weigh(self, option: Variable) -> None:
+        """Have a thread ask for the odds of each value, and leave those of another option."""
+        case, key, odds_over = self.session.case, self._key(option), self.workspace.engine.odds_over
+        if case is None or key == self._weighed:
+            return
+        self._weighed = key
+
+        def work() -> list[Odds]:
+            worker, found = get_current_worker(), []
+            for one in odds_over(case, option, dict(key[1])):
+                if worker.is_cancelled:
+                    raise CancelledError
+                found.append(one)
+            return found
+
+        self.ask(RESPONSE, work)
 
     def _caveats(self, option: Variable) -> list[str]:
         session, value = self.session, self.session.basket.values.get(option.name)

@@ -14,8 +14,9 @@ from care_core.records import replace
 from care_core.text import clean
 from care_core.variables import Threshold
 from care_tui.messages import Judge
+from care_tui.pages.figured import LEAST_FIGURE
 from care_tui.pages.page import View, enter_to, sentence
-from care_tui.pages.proven import LEAST_FIGURE, ProvenPage
+from care_tui.pages.proven import ProvenPage
 from care_tui.render.objectives import counted, objective_detail, objective_item, run_rows
 from care_tui.render.rows import Row, Rows, folded
 from care_tui.screens.prompt import Prompt
@@ -40,7 +41,6 @@ def _wrong(bound: Threshold | None, typed: str) -> str:
 
 class ObjectivesPage(ProvenPage):
     NAME = "objectives"
-    BESIDE = JUDGED
     NOTHING = "nothing is judged"
     HELP = (
         "What the mission is judged by. Enter shows what caused the fault under the cursor, else the first fault that "
@@ -106,6 +106,9 @@ class ObjectivesPage(ProvenPage):
             return False
         result = self.session.diagnosis.objectives[index]
         return self.has_figure(result.name, result)
+
+    def beside_title(self) -> str:
+        return JUDGED
 
     def beside(self) -> list[Row]:
         """How it was judged, beside the figure."""

@@ -1,49 +1,17 @@
-"""A step whose text has the figure that proves what is under the cursor, and what else is said of it in a pane beside
-the figure where the screen is wide."""
+"""A step whose figure is what proves what is under the cursor."""
 
 from __future__ import annotations
 
-from typing import ClassVar
-
-from textual import on
-from textual.app import ComposeResult
-from textual.containers import Container
 from textual.content import Content
 
 from care_core.application.proof import Subject
-from care_tui.pages.diagnosis import DiagnosisPage
+from care_tui.pages.figured import FiguredPage
 from care_tui.pages.proofs import has_proof, proof_rows
-from care_tui.render.rows import Row, Rows
-from care_tui.widgets.choices import Choices
-from care_tui.widgets.reader import Reader
-
-FIGURE, LEAST_FIGURE = 14, 6
-"""Lines of a figure below a text at most, and at least."""
+from care_tui.render.rows import Row
 
 
-class ProvenPage(DiagnosisPage):
-    """List and `side` on the left, the figure on the right; one below the other where the screen is narrow."""
-
-    FITS = True
-    BESIDE: ClassVar[str]
-    """Title of the pane beside the figure."""
-
-    def compose(self) -> ComposeResult:
-        with Container(id="left"):
-            yield Choices(self.glyphs, id="list")
-            side = Reader(self.glyphs, id="side")
-            side.border_title = self.BESIDE
-            yield side
-        yield Reader(self.glyphs, id="text")
-
-    def beside(self) -> list[Row]:
-        """What stands beside the figure where there is room; nothing where the text says it all."""
-        raise NotImplementedError
-
-    @property
-    def is_wide(self) -> bool:
-        """Whether list, text and figure stand side by side."""
-        return self.screen.has_class("-wide") or self.screen.has_class("-widest")
+class ProvenPage(FiguredPage):
+    """The figure is a signal over time, or a map of the way."""
 
     def figure(self, name: str, subject: Subject, around: int) -> list[Row]:
         """The proof of a subject in what room so many lines around it leave.
@@ -53,40 +21,9 @@ class ProvenPage(DiagnosisPage):
         """
         if not self.reader.has_room:  # it is asked again when there is some
             return []
-        width, height = self._room(around)
-        rows = proof_rows(self, name, subject, width, height)
+        rows = proof_rows(self, name, subject, *self.room_of_figure(around))
         return [*rows, Row(Content())] if rows and not self.is_wide else rows
 
     def has_figure(self, name: str, subject: Subject) -> bool:
         """Whether a subject has a proof that can be drawn in the whole pane, or one may be found."""
-        return self.reader.has_room and has_proof(self, name, subject, *self._room(0))
-
-    def _room(self, around: int) -> tuple[int, int]:
-        """Cells and lines of a figure beside so many lines of text."""
-        room = self.reader.room
-        height = max(room.height - around, LEAST_FIGURE)
-        return room.width, height if self.is_wide else min(height, FIGURE)
-
-    def height(self, rows: list[Row]) -> int:
-        """Lines that rows take."""
-        return len(Rows(rows).wrap(self.reader.room.width))
-
-    def show_text(self, *, from_top: bool = True) -> None:
-        super().show_text(from_top=from_top)
-        self._show_side()
-
-    def show(self, index: int | None = None) -> None:
-        super().show(index)
-        self._show_side()
-
-    def _show_side(self) -> None:
-        side = self.query_one("#side", Reader)
-        rows = self.beside() if self.is_wide and self.has_content else []
-        side.display = bool(rows)
-        self.query_one("#left").display = self.choices.display or side.display  # else the text has the whole width
-        if rows:
-            side.show(Rows(rows))
-
-    @on(Reader.Fitted, "#side")
-    def _side_fits(self, event: Reader.Fitted) -> None:
-        event.stop()
+        return self.reader.has_room and has_proof(self, name, subject, *self.room_of_figure())

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
 from textual.pilot import Pilot
 
-from care_core.application.case import Case, Progress, Request
+from care_core.application.case import Case, Odds, Progress, Request
 from care_core.application.configuring import DiffSide
 from care_core.diagnose.records import Diagnosis, Fix
-from care_core.variables import Change
+from care_core.variables import Change, Variable
 from care_tui.app import CareApp
 from care_tui.engine import Engine
 from care_tui.screens.case import CaseScreen
@@ -59,6 +59,13 @@ def fake_predict(case: Case, changes: Mapping[str, float]) -> Fix:
     return Fix(made, probability, sample.PREDICTED)
 
 
+def fake_odds_over(case: Case, option: Variable, beside: Mapping[str, float]) -> Iterator[Odds]:
+    """Ever likelier up to the middle of the range, and a guess beyond it."""
+    values = option.across(9)
+    for place, value in enumerate(values):
+        yield Odds(value, min(2 * place / len(values), 0.9), is_guess=2 * place > len(values))
+
+
 def fake_diff(case: Case, fix: Fix, side: DiffSide) -> str:
     lines = [f"--- {side}", "+++ suggested"]
     for change in fix.changes:
@@ -89,6 +96,7 @@ def fake_engine(diagnose: Callable[..., Case]) -> Engine:
     return Engine(
         diagnose,
         fake_predict,
+        fake_odds_over,
         fake_diff,
         fake_report,
         lambda case, format: fake_report(case, "text" if format.name == "html" else format.name),
