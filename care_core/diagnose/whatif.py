@@ -51,6 +51,14 @@ class Answer(Record):
         return not all(change.in_support for change in self.changes)
 
 
+class Over(Record):
+    """The answers for the values of one option."""
+
+    option: Variable
+    current: float
+    answers: tuple[tuple[float, Answer], ...]
+
+
 class Question(Record, eq=False):
     """A run ready to be asked "what if"; `ask` is pure and takes milliseconds."""
 
@@ -166,7 +174,22 @@ def parse_change(text: str, schema: Schema) -> tuple[str, float]:
     return option.name, number
 
 
-def option_named(name: str, schema: Schema) -> Variable:
+def ask_over(question: Question, name: str, beside: Mapping[str, float]) -> Over:
+    """What the values of one option would bring, beside other changes.
+
+    Raises:
+        UsageError: no such option, or one of which no range is known.
+    """
+    option = option_named(name, question.schema, "--over")
+    if not option.across(ACROSS):
+        raise UsageError(
+            f"Nothing says between which values {option.name} may be.", hint="Ask for one with --set.", where="--over"
+        )
+    others = {changed: value for changed, value in beside.items() if changed != option.name}
+    return Over(option, question.query.config[option.name], tuple(question.over(option.name, others)))
+
+
+def option_named(name: str, schema: Schema, where: str = "--set") -> Variable:
     """An option by its name or by one of its parameters. Raises UsageError, which names the nearest."""
     variable = schema.variables.get(name)
     if variable is not None and variable.role is Role.OPTION:
@@ -176,10 +199,10 @@ def option_named(name: str, schema: Schema) -> Variable:
         return by_parameter[name]
     if variable is not None:
         how = "met" if variable.role is Role.CONTEXT else "measured"
-        raise UsageError(f"{name} is {how}, not set.", hint="Only parameters can be set.", where="--set")
+        raise UsageError(f"{name} is {how}, not set.", hint="Only parameters can be set.", where=where)
     names = [option.name for option in schema.options]
     folded = {known.casefold(): known for known in names}
     close = folded.get(name.casefold())
     hint = f"Did you mean '{close}'?" if close else nearest(name, [*names, *by_parameter])
     hint = hint or f"List them with 'care profiles show {schema.name}'."
-    raise UsageError(f"The profile has no parameter '{name}'.", hint=hint, where="--set")
+    raise UsageError(f"The profile has no parameter '{name}'.", hint=hint, where=where)

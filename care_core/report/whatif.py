@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from care_core.diagnose.verdict import chance, fit_text
-from care_core.diagnose.whatif import Answer, Outlook, Question
+from care_core.diagnose.whatif import Answer, Outlook, Over, Question
 from care_core.numbers import six_digits
 from care_core.records import field
 from care_core.report.document import (
@@ -42,6 +42,25 @@ class OutlookEntry(Document, kw_only=True):
     p_ok_unchanged: float | None
 
 
+class ValueEntry(Document, kw_only=True):
+    """What one value of an option would bring."""
+
+    value: int | float
+    p_ok: float
+    guess: bool
+    objectives: dict[str, float | None]
+    """Probability that each is met."""
+
+
+class OverEntry(Document, kw_only=True):
+    """What the values of one option would bring, from one end of its range to the other."""
+
+    option: str
+    unit: str
+    current: int | float
+    values: list[ValueEntry]
+
+
 class WhatIfDocument(Document, kw_only=True):
     """The predicted outcome of this run under changed options, as `care whatif --json` prints it."""
 
@@ -57,6 +76,8 @@ class WhatIfDocument(Document, kw_only=True):
     p_ok_unchanged: float
     lost_by: list[str] = field(default_factory=list)
     """What this run was lost by: the probabilities are those of a run that it does not happen to."""
+    over: OverEntry | None = None
+    """Of one option many values, beside the changes; None where that was not asked."""
 
 
 def whatif_schema() -> dict[str, Any]:
@@ -64,8 +85,8 @@ def whatif_schema() -> dict[str, Any]:
     return WhatIfDocument.json_schema()
 
 
-def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
-    """The answer as a document."""
+def whatif_document(question: Question, answer: Answer, over: Over | None = None) -> WhatIfDocument:
+    """The answer as a document, with that for the values of one option where it was asked."""
     return WhatIfDocument(
         fit=publish(Fit, question.profile.fit),
         profile=publish(ProfileEntry, question.profile),
@@ -93,23 +114,62 @@ def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
         guess=answer.is_guess,
         p_ok_unchanged=six_digits(answer.p_ok_now),
         lost_by=publishable(question.lost_by),
+        over=None if over is None else _over_entry(over),
     )
 
 
-def whatif_json(question: Question, answer: Answer) -> str:
+def _over_entry(over: Over) -> OverEntry:
+    entries = [
+        ValueEntry(
+            value=plain_number(value),
+            p_ok=six_digits(answer.p_ok),
+            guess=answer.is_guess,
+            objectives={one.objective.variable.name: estimate(one.predicted.p_ok) for one in answer.outlooks},
+        )
+        for value, answer in over.answers
+    ]
+    option = over.option
+    return OverEntry(option=option.name, unit=option.unit, current=plain_number(over.current), values=entries)
+
+
+def whatif_json(question: Question, answer: Answer, over: Over | None = None) -> str:
     """The document, one object."""
-    return whatif_document(question, answer).to_json()
+    return whatif_document(question, answer, over).to_json()
 
 
-def whatif_text(question: Question, answer: Answer) -> str:
-    """The answer in lines: what is changed, then each objective."""
-    return "\n".join(_lines(question, answer)) + "\n"
+def whatif_text(question: Question, answer: Answer, over: Over | None = None) -> str:
+    """The answer in lines: what is changed, then each objective, then the values of one option."""
+    lines = [*_head(question)]
+    lines += _predicted(question, answer) if answer.changes or over is None else ()
+    lines += _over(over) if over is not None else ()
+    return "\n".join(lines) + "\n"
 
 
-def _lines(question: Question, answer: Answer) -> Iterator[str]:
+def _over(over: Over) -> Iterator[str]:
+    """A line for each value: the odds of all objectives, then of each."""
+    option = over.option
+    names = [one.objective.variable.name for one in over.answers[0][1].outlooks]
+    shown = [option.show(value) for value, _ in over.answers]
+    width = max(len(word) for word in (option.name, *shown))
+    yield ""
+    yield from wrapped(f"Odds by the value of {option.name}" + (f", in {option.unit}" if option.unit else ""))
+    yield f"{option.name:>{width}}   all  {'  '.join(names)}"
+    for word, (value, answer) in zip(shown, over.answers, strict=True):
+        each = (
+            f"{'?' if one.predicted.p_ok is None else percent(one.predicted.p_ok):>{len(name)}}"
+            for name, one in zip(names, answer.outlooks, strict=True)
+        )
+        said = "  as driven" if value == over.current else "  a guess: no training run came near" * answer.is_guess
+        yield f"{word:>{width}} {percent(answer.p_ok):>5}  {'  '.join(each)}{said}"
+
+
+def _head(question: Question) -> Iterator[str]:
     yield from wrapped(fit_text(question.profile.title, question.profile.fit))
     log = Path(question.run.log.path).name
     yield from wrapped(f"{log}, profile {question.profile.name} {question.profile.version}", "Log  ")
+
+
+def _predicted(question: Question, answer: Answer) -> Iterator[str]:
     yield ""
     for change in answer.changes:
         option = change.option

@@ -26,7 +26,7 @@ from care_tui.commands.arguments import (
     is_json,
 )
 from care_tui.commands.past import NoHistory, mention
-from care_tui.completing import changes
+from care_tui.completing import changes, option_names
 from care_tui.console import Progress, emit
 
 app = typer.Typer()
@@ -39,6 +39,12 @@ def whatif(
         list[str] | None,
         typer.Option("--set", metavar="OPTION=VALUE", help="Ask with this changed.", autocompletion=changes),
     ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over", metavar="OPTION", help="Ask for values across this one's range.", autocompletion=option_names
+        ),
+    ] = None,
     profile: ProfileName = None,
     config: ConfigPaths = None,
     threshold: Thresholds = None,
@@ -50,11 +56,12 @@ def whatif(
     force: Force = False,
 ) -> None:
     """Predict what a run would have done with other options. Ends with 0, whatever the probability."""
-    from care_core.diagnose.whatif import parse_change
+    from care_core.diagnose.whatif import ask_over, parse_change
     from care_core.report.whatif import whatif_json, whatif_text
 
-    if not set_:
-        raise UsageError("Nothing is asked.", hint="Change a parameter with --set OPTION=VALUE.", where="--set")
+    if not set_ and over is None:
+        hint = "Change a parameter with --set OPTION=VALUE, or ask for all of its values with --over OPTION."
+        raise UsageError("Nothing is asked.", hint=hint, where="--set")
     request = Request(
         log,
         profile,
@@ -66,9 +73,10 @@ def whatif(
     )
     with Progress() as progress:
         question = read_case(request, progress).question
-    answer = question.ask(dict(parse_change(text, question.schema) for text in set_))
+    changes = dict(parse_change(text, question.schema) for text in set_ or ())
+    answer, values = question.ask(changes), None if over is None else ask_over(question, over, changes)
     as_json = json or is_json(out)
-    emit((whatif_json if as_json else whatif_text)(question, answer), out, force=force, is_plain=not as_json)
+    emit((whatif_json if as_json else whatif_text)(question, answer, values), out, force=force, is_plain=not as_json)
 
 
 @app.command()

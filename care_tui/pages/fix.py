@@ -91,7 +91,7 @@ class FixPage(FiguredPage):
         index, session.option = self._place(options), None
         listing = Listing(len(options), item, lambda i: f"{options[i].name} {options[i].doc}")
         has_figure = self._has_figure(self.option_here())
-        about = "What each value brings" if has_figure else self.beside_title()
+        about = "Odds of all objectives, by its value" if has_figure else self.beside_title()
         return View(self._title(), lambda i: self._detail(None if i is None else options[i]), listing, index, about)
 
     def beside_title(self) -> str:
@@ -144,8 +144,7 @@ class FixPage(FiguredPage):
 
     def _has_figure(self, option: Variable | None) -> bool:
         """Whether the odds over an option's values have a pane of their own."""
-        case = self.session.case
-        if option is None or case is None or case.reading is None or not self.is_wide or not self.reader.has_room:
+        if option is None or not self.is_wide or not self.reader.has_room or self.session.fix_error is not None:
             return False
         return bool(option.across(2)) and self._responses.get(self._key(option)) != []
 

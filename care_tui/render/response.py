@@ -10,7 +10,6 @@ from textual.content import Content
 
 from care_core.application.case import Odds
 from care_core.report.axes import value_ticks
-from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.render.odds import promise
 from care_tui.render.plot import AXIS, Column, dots_across, plot
@@ -30,8 +29,7 @@ def response_rows(
         odds: by value, ascending. marks: values that are pointed at, and what they are.
         height: lines of all of it.
     """
-    unit = f", by {clean(option.name)} in {clean(option.unit)}" if option.unit else f", by {clean(option.name)}"
-    head = Row(cut(text(f"odds that all objectives are met{unit}", "bold"), width, glyphs))
+    head = Row(cut(text(f"{option.name}, {option.unit}" if option.unit else option.name, "bold"), width, glyphs))
     if len(odds) <= FEW or option.labels:
         return [head, *_bars(option, odds, marks, glyphs)]
     wide = max(width - AXIS, 10)
@@ -79,6 +77,7 @@ def _columns(option: Variable, odds: Sequence[Odds], wide: int, glyphs: Glyphs, 
 def _place(option: Variable, odds: Sequence[Odds], value: float) -> float:
     """Where a value stands between the first and the last, 0 to 1, on the option's scale."""
     low, high = odds[0].value, odds[-1].value
+    value = min(max(value, low), high)
     if option.is_log_scaled and low > 0:
         return math.log(value / low) / math.log(high / low)
     return (value - low) / (high - low)

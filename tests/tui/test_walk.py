@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import re
 from asyncio import gather
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,11 @@ from textual.dom import DOMNode
 from textual.pilot import Pilot
 from textual.widgets import Static
 
+from care_core.application.case import Case, Odds
 from care_core.diagnose.records import Circumstance, Diagnosis, Fault, PathNode
 from care_core.errors import ExitCode
 from care_core.records import replace
+from care_core.variables import Variable
 from care_tui.app import CareApp
 from care_tui.page_names import NAMES
 from care_tui.pages.making import page_classes
@@ -325,6 +328,32 @@ async def test_a_value_of_ones_own_has_odds_of_its_own_also_beside_other_changes
         assert len(ticked) == 2
         assert set(ticked.items()) <= set(walk(app).session.alone())
         assert walk(app).page.choices.plain.count("if only this") == 2
+
+
+async def test_a_wide_fix_draws_the_odds_over_the_values_of_a_parameter_and_asks_once(make_app: MakeApp) -> None:
+    app, asked = make_app(sample.faulty()), []
+    real = app.workspace.engine.odds_over
+
+    def count(case: Case, option: Variable, beside: Mapping[str, float]) -> Iterator[Odds]:
+        asked.append((option.name, dict(beside)))
+        return real(case, option, beside)
+
+    app.workspace.engine = replace(app.workspace.engine, odds_over=count)
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "4")
+        assert text(app).startswith("LAND_SPEED, cm/s")
+        assert {"16 as driven", "50 ticked"} <= {line.strip(" ▲") for line in text(app).splitlines()}
+        assert "dotted: no training run came near, a guess" in text(app)
+        await settle(pilot, "plus")
+        assert "ticked" in text(app)
+        assert "50 ticked" not in text(app)
+        assert asked == [("LAND_SPEED", {})]  # what it is set to itself changes nothing of its curve
+        await settle(pilot, "down")
+        assert text(app).startswith("WPNAV_SPEED, cm/s")
+        assert [name for name, beside in asked if "LAND_SPEED" in beside] == ["WPNAV_SPEED"]
+        await pilot.resize_terminal(80, 24)
+        await settle(pilot)
+        assert "mission_time" in text(app)  # where it is narrow the prediction has the pane
 
 
 async def test_slash_filters_and_escape_clears(make_app: MakeApp) -> None:

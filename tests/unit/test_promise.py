@@ -34,6 +34,15 @@ def test_a_change_away_from_the_reference_takes_no_cause_away(planted: Profile) 
     assert odds(one, speed=1.6 if DEFAULTS["speed"] < 1.4 else 1.2) <= one.as_driven() + 0.01
 
 
+def test_what_is_past_the_reference_is_left_to_the_mechanisms(planted: Profile) -> None:
+    """Farther from the reference than the run was, on its other side: the cause is gone, and the objectives tell."""
+    one = promise(planted, {SPEED: 0.95})
+    reference = DEFAULTS["speed"]
+    far = reference + 2 * (reference - 1.4)
+    kept = one.query.probability([{**one.query.config, "speed": far}])[0]
+    assert odds(one, speed=far) == pytest.approx(kept, abs=0.15)
+
+
 def test_a_failed_part_leaves_a_change_no_more_than_it_does_not_explain(planted: Profile) -> None:
     one = promise(planted, {SPEED: 0.5, MOTOR: 0.9})
     assert odds(one, speed=DEFAULTS["speed"]) <= 1.0 - one.failure.acts(MOTOR) + 1e-9

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.diagnose.judging import judge
-from care_core.diagnose.whatif import Question, parse_change, question
+from care_core.diagnose.whatif import Question, ask_over, parse_change, question
 from care_core.ecosystems.findings import Finding, Health
 from care_core.errors import UsageError
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.report.whatif import whatif_document, whatif_text
 from care_core.run import ProfileChoice
+from care_core.variables import Role, Variable
 from tests.conftest import Care
 from tests.planted import CALM, DEFAULTS, SCHEMA, fly, planted_run
 
@@ -50,6 +52,41 @@ def test_asking_for_no_change_gives_the_run_again(slow: Question) -> None:
     answer = slow.ask({})
     assert answer.p_ok == answer.p_ok_now
     assert answer.changes == ()
+
+
+def test_over_an_options_range_each_value_has_the_odds_that_it_has_alone(slow: Question) -> None:
+    over = ask_over(slow, "speed", {"accel": 2.0, "speed": 9.0})
+    values = [value for value, _ in over.answers]
+    assert values == sorted(values)
+    assert (values[0], values[-1]) == slow.schema.variables["speed"].range
+    assert {over.current, DEFAULTS["speed"]} <= set(values)
+    assert over.current == 2.0
+    for value, answer in over.answers[::6]:
+        assert answer == slow.ask({"accel": 2.0, "speed": value})
+    text = whatif_text(slow, slow.ask({}), over)
+    assert re.search(r"^ +2 .*as driven$", text, re.MULTILINE)
+    assert "with the change" not in text  # nothing was changed
+    entry = whatif_document(slow, slow.ask({}), over).over
+    assert entry is not None
+    assert [one.p_ok for one in entry.values] == [pytest.approx(answer.p_ok, abs=1e-6) for _, answer in over.answers]
+
+
+def test_an_enum_has_each_of_its_codes_and_what_is_unbounded_nothing(slow: Question) -> None:
+    planner = slow.schema.variables["planner"]
+    assert [value for value, _ in ask_over(slow, "planner", {}).answers] == [code for code, _ in planner.labels]
+    free = replace(slow.schema.variables["speed"], range=None)
+    unbound = replace(slow, schema=replace(slow.schema, variables={**slow.schema.variables, "speed": free}))
+    with pytest.raises(UsageError, match="between which values speed may be"):
+        ask_over(unbound, "speed", {})
+
+
+@given(low=st.floats(-5, 5), span=st.floats(0.01, 100), count=st.integers(2, 30))
+def test_values_across_a_range_ascend_from_end_to_end(low: float, span: float, count: int) -> None:
+    option = Variable("x", Role.OPTION, range=(low, low + span))
+    values = option.across(count)
+    assert list(values) == sorted(set(values))
+    assert len(values) <= count
+    assert (values[0], values[-1]) == (option.snap(low), option.snap(low + span))
 
 
 def test_what_speaks_against_a_value_is_said_beside_it(slow: Question) -> None:
