@@ -43,10 +43,10 @@ def graph_of_run(request: Request, progress: Progress) -> GraphDocument:
         raise ProfileError(
             "No profile fits this log.", hint="Name one: 'care profiles' lists them.", where=str(request.log)
         )
-    return graph_document(case.reading.profile, _path_of_cause(case))
+    return graph_document(case.reading.profile, path_of_cause(case))
 
 
-def _path_of_cause(case: Case) -> tuple[str, ...]:
+def path_of_cause(case: Case) -> tuple[str, ...]:
     """The path from the parameter that explains a run best; none where something else explains it better."""
     diagnosis = case.diagnosis
     first = next(iter(diagnosis.hypotheses), None)

@@ -1,4 +1,4 @@
-"""A step with a figure of what is under the cursor, and what else is said of it in a pane beside the figure where the
+"""A page with a figure of what is under the cursor, and what else is said of it in a pane beside the figure where the
 screen is wide."""
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from textual.app import ComposeResult
 from textual.containers import Container
 from textual.geometry import Size
 
-from care_tui.pages.diagnosis import DiagnosisPage
+from care_tui.pages.page import Page
 from care_tui.render.rows import Row, Rows
 from care_tui.widgets.choices import Choices
 from care_tui.widgets.reader import Reader
@@ -17,7 +17,7 @@ FIGURE, LEAST_FIGURE = 14, 6
 """Lines of a figure below a text at most, and at least."""
 
 
-class FiguredPage(DiagnosisPage):
+class FiguredPage(Page):
     """List and `side` on the left, the figure on the right; one below the other where the screen is narrow."""
 
     FITS = True
@@ -61,7 +61,7 @@ class FiguredPage(DiagnosisPage):
 
     def _show_side(self) -> None:
         side = self.query_one("#side", Reader)
-        rows = self.beside() if self.is_wide and self.has_content else []
+        rows = self.beside() if self.is_wide else []
         side.display = bool(rows)
         self.query_one("#left").display = self.choices.display or side.display  # else the text has the whole width
         if rows:

@@ -16,6 +16,7 @@ from care_core.variables import Variable
 from care_tui.basket import nudged, parsed, possible
 from care_tui.engine import CancelledError
 from care_tui.messages import Decided
+from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.figured import FiguredPage
 from care_tui.pages.page import View, enter_to
 from care_tui.render.fix import no_fix_rows, option_item, option_rows, outcome_rows
@@ -31,7 +32,7 @@ Key = tuple[str, frozenset[tuple[str, float]]]
 """An option, and the changes beside which its values are asked for."""
 
 
-class FixPage(FiguredPage):
+class FixPage(FiguredPage, DiagnosisPage):
     NAME = "fix"
     NOTHING = "no change is suggested"
     HELP = (

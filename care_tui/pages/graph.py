@@ -1,4 +1,5 @@
-"""The causal model around a variable: what it depends on, and what depends on it."""
+"""The causal model around a variable: what it depends on, and what depends on it, with the tree behind it where the
+screen is wide."""
 
 from __future__ import annotations
 
@@ -8,18 +9,23 @@ from textual.binding import Binding, BindingType
 from textual.content import Content
 
 from care_core.application.case import Case
+from care_core.application.graphing import path_of_cause
 from care_core.application.proof import Subject
 from care_core.diagnose.records import Cause, ObjectiveResult
 from care_core.records import Record
 from care_core.run import is_known
 from care_core.text import figures
-from care_tui.pages.page import Page, View, enter_to, sentence
+from care_core.variables import Role, Variable
+from care_tui.pages.figured import FiguredPage
+from care_tui.pages.page import View, enter_to, sentence
 from care_tui.render.rows import FEW_RESAMPLES, Row, Rows, heading, labelled, measure, padded, percent, warning
+from care_tui.render.tree import tree_rows
 from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
 
 if TYPE_CHECKING:  # reading models is not needed for the first frame
     from care_core.causal.model import EdgeRecord
+    from care_core.causal.tree import Way
 
 NARROW = 66
 """Cells that the words of a neighbour need."""
@@ -34,10 +40,12 @@ class Link(Record):
     support: float | None
 
 
-class GraphPage(Page):
+class GraphPage(FiguredPage):
     HELP = (
         "The causal model around one variable, with the effect of every edge and how many resamples hold it. Enter "
-        "goes to the neighbour under the cursor, h goes back, Esc leaves."
+        "goes to the neighbour under the cursor, h goes back, Esc leaves. From 120 columns the tree of what leads to "
+        "the variable stands beside it, of a parameter that of what comes of it, with what each was in this run; the "
+        "path of this run's cause is marked, and ? stands where few resamples hold an edge."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Go there"),
@@ -67,7 +75,44 @@ class GraphPage(Page):
         node, links = self._trail[-1], self._links(self._trail[-1])
         title = Content(f"Around {node}: {self._counts(links)}; effects in standard deviations")
         listing = Listing(len(links), lambda i, width: (self._item(links[i], width),), lambda i: links[i].name)
-        return View(title, lambda i: self._detail(node, None if i is None else links[i]), listing)
+        if not self.is_wide:
+            return View(title, lambda i: self._detail(node, None if i is None else links[i]), listing)
+        about = "What comes of it" if self._way(node) == "effects" else "What leads to it"
+        return View(title, lambda _: self._tree(node), listing, about=f"{about}: in this run, effect")
+
+    def _way(self, node: str) -> Way:
+        """What is worth a tree: of a parameter nothing else is known than what comes of it."""
+        variable = self._variable(node)
+        return "effects" if variable is not None and variable.role in (Role.OPTION, Role.CONTEXT) else "causes"
+
+    def _tree(self, node: str) -> Rows:
+        from care_core.causal.tree import tree_of
+
+        model, room = self._case.model, self.reader.room
+        assert model is not None
+        tree = tree_of(model, node, self._way(node), room.height - 1)
+        return Rows(tree_rows(tree, self._in_run, path_of_cause(self._case), room.width, self.glyphs))
+
+    def _in_run(self, name: str) -> str:
+        """What a variable was in this run; nothing where that is not known."""
+        value, variable = self._case.diagnosis.run.value(name), self._variable(name)
+        if not is_known(value):
+            return ""
+        return (
+            variable.show(value) if variable and variable.labels else measure(value, variable.unit if variable else "")
+        )
+
+    def _variable(self, name: str) -> Variable | None:
+        return self._case.schema.variables.get(name) if self._case.schema else None
+
+    def beside_title(self) -> str:
+        return "About"
+
+    def beside(self) -> list[Row]:
+        index = self.index
+        if index is None or not self._trail:
+            return []
+        return list(self._detail(self._trail[-1], self._links(self._trail[-1])[index]).rows)
 
     @staticmethod
     def _counts(links: list[Link]) -> str:
@@ -107,15 +152,12 @@ class GraphPage(Page):
         return Rows(rows)
 
     def _about(self, name: str) -> list[Row]:
-        case, run = self._case, self._case.diagnosis.run
-        variable = case.schema.variables.get(name) if case.schema else None
-        value, unit = run.value(name), "" if variable is None else variable.unit
+        case, variable = self._case, self._variable(name)
+        unit = "" if variable is None else variable.unit
         rows = [heading(name)]
         if variable is not None:
-            shown = "not known in this run"
-            if is_known(value):
-                shown = variable.show(value) if variable.labels else measure(value, unit)
-            rows += [labelled("Role", variable.role.value), labelled("This run", shown)]
+            rows.append(labelled("Role", variable.role.value))
+            rows.append(labelled("This run", self._in_run(name) or "not known in this run"))
             if variable.doc:
                 rows.append(labelled("About", variable.doc))
         reference = case.reading.judged.reference.config if case.reading else {}

@@ -5,12 +5,13 @@ from __future__ import annotations
 from textual.content import Content
 
 from care_core.application.proof import Subject
+from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.figured import FiguredPage
 from care_tui.pages.proofs import has_proof, proof_rows
 from care_tui.render.rows import Row
 
 
-class ProvenPage(FiguredPage):
+class ProvenPage(FiguredPage, DiagnosisPage):
     """The figure is a signal over time, or a map of the way."""
 
     def figure(self, name: str, subject: Subject, around: int) -> list[Row]:

@@ -51,6 +51,8 @@ class Glyphs(Record):
     ahead: str
     more: str
     rule: str
+    tee: str
+    corner: str
     open: str
     shade: str
 
@@ -69,6 +71,8 @@ UNICODE = Glyphs(
     ahead="░",
     more="…",
     rule="─",
+    tee="├",
+    corner="╰",
     open="▾",
     shade="·",
 )
@@ -86,6 +90,8 @@ ASCII = Glyphs(
     ahead=".",
     more="~",
     rule="-",
+    tee="|",
+    corner="`",
     open="v",
     shade=":",
 )

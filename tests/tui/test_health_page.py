@@ -11,6 +11,7 @@ from care_core.records import replace
 from care_core.run import Check, Fit, MissionInfo
 from care_tui.app import CareApp
 from care_tui.settings import Settings
+from care_tui.widgets.reader import Reader
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
 from tests.tui.test_walk import answer, index, items, shown, step_of, text, title, walk
@@ -252,7 +253,8 @@ async def test_no_odds_are_told_without_what_no_prediction_knows_of(make_app: Ma
     async with app.run_test(size=(120, 40)) as pilot:
         await settle(pilot, "4")
         assert "unless it happens again" in answer(app)
-        assert "Unless      it happens again: motor 2 lost thrust" in text(app)
+        side = walk(app).page.query_one("#side", Reader).plain
+        assert "Unless      it happens again: motor 2 lost thrust" in side
     note = "the steering oscillates: a gain is too high: LAND_SPEED 60 (reference 50)"
     lost = replace(
         sample.all_ok(),
