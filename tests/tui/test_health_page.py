@@ -268,6 +268,7 @@ async def test_no_odds_are_told_without_what_no_prediction_knows_of(make_app: Ma
         assert f"Note        {note}" in " ".join(text(app).split("\n"))
         assert "another thing" not in text(app)
         await settle(pilot, "enter")
-        assert "LAND_SPEED  " in text(app), "the cursor is on it"
-        assert text(app).startswith("FAULT: motor 2 lost thrust")
-        assert "Unless      it happens again: motor 2 lost thrust" in text(app)
+        assert text(app).startswith("LAND_SPEED, cm/s"), "the cursor is on it"
+        side = walk(app).page.query_one("#side", Reader).plain
+        assert side.startswith("FAULT: motor 2 lost thrust")
+        assert "Unless      it happens again: motor 2 lost thrust" in side
