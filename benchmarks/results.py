@@ -131,7 +131,7 @@ BENCHMARKS = (
     Benchmark(
         "own_code", "benchmarks.own_code", "3 x the library, or what it loses of a damaged file", "the libraries"
     ),
-    Benchmark("tui", "benchmarks.tui", "0.5 s to the first frame, 50 ms a key, 2 kB", "harlequin, posting, btop"),
+    Benchmark("tui", "benchmarks.tui", "0.5 s to the first frame, 50 ms a key, 2 kB", "lazygit, harlequin, posting, btop"),
     Benchmark("fuzz", "benchmarks.tools.fuzzing --seconds 60", "no finding in any target", "none"),
     Benchmark(
         "mutate",

@@ -27,8 +27,12 @@ from care_tui.settings import Settings
 
 SIZE, WIDE = (80, 24), (120, 36)
 SAMPLE = "arducopter_failed.BIN"
-WIDE_OF = {SAMPLE: "wide-signal", "px4_failed.ulg": "wide-map"}
-"""Samples whose causes are drawn on a wide screen: one that a signal proves, and one that the way proves."""
+WIDE_OF = {
+    SAMPLE: {"3": "wide-signal", "4": "wide-odds", "2,w": "wide-tree"},
+    "px4_failed.ulg": {"3": "wide-map"},
+}
+"""What is drawn on a wide screen, by the keys that lead there: causes that a signal proves, and that the way proves, the
+odds over the values of a parameter, and the tree of what leads to an objective."""
 PAGE, COMPARED = (900, 2280), (900, 2300)
 _ROOT = Path(__file__).parents[2]
 PAIRS = {
@@ -51,8 +55,8 @@ async def draw(folder: Path) -> None:
     await _walk(
         folder, SAMPLE, SIZE, {page.keys: f"{number}-{page.name}" for number, page in enumerate(STEPS, start=1)}
     )
-    for sample, name in WIDE_OF.items():
-        await _walk(folder, sample, WIDE, {"3": name})
+    for sample, pictures in WIDE_OF.items():
+        await _walk(folder, sample, WIDE, pictures)
 
 
 async def _walk(folder: Path, sample: str, size: tuple[int, int], pictures: Mapping[str, str]) -> None:
@@ -61,7 +65,7 @@ async def _walk(folder: Path, sample: str, size: tuple[int, int], pictures: Mapp
     async with app.run_test(size=size) as pilot:
         for keys, name in pictures.items():
             await _rest(pilot)
-            await pilot.press(keys)
+            await pilot.press(*keys.split(","))
             await _rest(pilot)
             picture = folder / f"{name}.svg"
             write_atomically(picture, app.export_screenshot(title=f"care {sample}", simplify=True))
