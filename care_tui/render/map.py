@@ -18,6 +18,8 @@ _TALL = 2.0
 """How much higher than wide a cell is."""
 _RULER = 10
 """Cells of the ruler."""
+_LEAST_M = 2.0
+"""Metres that a map shows at least: a robot that stood has not wandered all over it."""
 
 
 class _Canvas:
@@ -28,8 +30,9 @@ class _Canvas:
         self.ascii, self.width, self.height = ascii, width, height
         self.across, self.down = (1, 1) if ascii else (2, 4)
         east, north = [x for x, _ in points], [y for _, y in points]
-        self.left, self.top = min(east), max(north)
-        wide, high = max(max(east) - self.left, 0.1), max(self.top - min(north), 0.1)
+        wide, high = max(max(east) - min(east), _LEAST_M), max(max(north) - min(north), _LEAST_M)
+        self.left = (min(east) + max(east) - wide) / 2
+        self.top = (min(north) + max(north) + high) / 2
         self.metres = max(wide / max(width - 1, 1), high / max((height - 1) * _TALL, 1))
         """Metres that a cell is wide."""
         self.left -= (width * self.metres - wide) / 2
