@@ -131,7 +131,10 @@ BENCHMARKS = (
     Benchmark(
         "own_code", "benchmarks.own_code", "3 x the library, or what it loses of a damaged file", "the libraries"
     ),
-    Benchmark("tui", "benchmarks.tui", "0.5 s to the first frame, 50 ms a key, 2 kB", "lazygit, harlequin, posting, btop"),
+    Benchmark(
+        "tui", "benchmarks.tui", "0.5 s to the first frame, 50 ms a key, 2 kB", "lazygit, harlequin, posting, btop"
+    ),
+    Benchmark("widgets", "benchmarks.widgets", "a third of the bytes or of the time", "Textual's own"),
     Benchmark("fuzz", "benchmarks.tools.fuzzing --seconds 60", "no finding in any target", "none"),
     Benchmark(
         "mutate",

@@ -31,8 +31,8 @@ WIDE_OF = {
     SAMPLE: {"3": "wide-signal", "4": "wide-odds", "2,w": "wide-tree"},
     "px4_failed.ulg": {"3": "wide-map"},
 }
-"""What is drawn on a wide screen, by the keys that lead there: causes that a signal proves, and that the way proves, the
-odds over the values of a parameter, and the tree of what leads to an objective."""
+"""What is drawn on a wide screen, by the keys that lead there: causes that a signal proves, and that the way proves,
+the odds over the values of a parameter, and the tree of what leads to an objective."""
 PAGE, COMPARED = (900, 2280), (900, 2300)
 _ROOT = Path(__file__).parents[2]
 PAIRS = {
