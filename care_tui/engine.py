@@ -7,16 +7,17 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Odds, Progress, Request, odds_over, open_case, predict
+from care_core.application.case import Case, Progress, Request, open_case, predict
 from care_core.application.configuring import DiffSide, apply_to_files, commands_of, diff_of, doubts_of
 from care_core.application.history_writing import remember, remember_triage
 from care_core.application.reporting import report_of
+from care_core.application.responses import odds_over
 from care_core.errors import CareError
 from care_core.records import Record
 from care_core.report.formats import FORMATS, Format
 
 if TYPE_CHECKING:
-    from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.diagnose.records import Diagnosis, Fix, Odds
     from care_core.report.document import TriageDocument
     from care_core.variables import Variable
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
-from care_core.application.open_run import OpenRun, Reading
+from care_core.application.open_run import OpenRun, Reading, question_of
 from care_core.errors import CareError
 from care_core.records import Record, field, force_setattr, replace
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from care_core.diagnose.judging import Judged
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.reference import Good
-    from care_core.diagnose.whatif import Question
     from care_core.ecosystems.base import RunModel
     from care_core.ecosystems.findings import Health
     from care_core.ecosystems.ros.drive import Drive
@@ -36,15 +35,6 @@ if TYPE_CHECKING:
 NOTHING: Settings = MappingProxyType({})
 Progress = Callable[[str, float], None]
 """Is told the step and the share that is done, 0 to 1."""
-
-
-class Odds(Record):
-    """How likely every objective is met with an option at a value."""
-
-    value: float
-    p_ok: float
-    is_guess: bool
-    """Whether no training run came near the changes."""
 
 
 class Request(Record):
@@ -465,7 +455,7 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     failed part or what the run met explains is taken off, as for the suggestion."""
     from care_core.diagnose.records import Fix
 
-    question = _question(case)
+    question = question_of(case)
     advised, options = case.diagnosis.fix, {option.name for option in case.options}
     if advised is not None and dict(changes) == changes_of(advised) and (advised.shown_by or changes.keys() - options):
         return advised
@@ -479,21 +469,3 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
     by_hand = bool(changes) and all(changes_of(one) != changes for one in fixes(case.diagnosis))
     return Fix(answer.changes, answer.p_ok, predicted, by_hand=by_hand)
-
-
-def odds_over(case: Case, option: Variable, beside: Mapping[str, float]) -> Iterator[Odds]:
-    """The odds that every objective is met by the value of one option, across its range and beside other changes; none
-    where the profile does not model what is changed."""
-    modelled = {one.name for one in case.options}
-    if option.name not in modelled or beside.keys() - modelled:
-        return
-    others = {name: value for name, value in beside.items() if name != option.name}
-    for value, answer in _question(case).over(option.name, others):
-        yield Odds(value, answer.p_ok, answer.is_guess)
-
-
-def _question(case: Case) -> Question:
-    """What a run can be asked. Raises CareError where there is no model of it."""
-    if case.reading is None:
-        raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
-    return replace(case.reading.question, failure=case.diagnosis.failure)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.errors import CareError
-from care_core.records import Record
+from care_core.records import Record, replace
 
 if TYPE_CHECKING:
     from care_core.causal.model import Model
@@ -66,3 +66,10 @@ def log_of(case: OpenRun) -> Log:
     if case.log is None:
         raise CareError("There is no log to look into.", hint="Open one.")
     return case.log
+
+
+def question_of(case: OpenRun) -> Question:
+    """What a run can be asked. Raises CareError where there is no model of it."""
+    if case.reading is None:
+        raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
+    return replace(case.reading.question, failure=case.diagnosis.failure)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from care_core.application.open_run import OpenRun
 from care_core.application.proof import finding_score, meanings
+from care_core.application.responses import responses_of
 from care_core.application.sharing import EVERYTHING, Sharing
 from care_core.application.signals import LONGEST_GAP, Signal, Source, lines_of, settled_s, signals_of, whole_of
 from care_core.application.signals import Line as Values
@@ -61,7 +62,7 @@ def drawn_of(case: OpenRun, sharing: Sharing = EVERYTHING) -> Drawing:
     """What there is to draw of a case, as far as it goes to others."""
     diagnosis = case.diagnosis
     if case.log is None:
-        return Drawing(faults=diagnosis.faults)
+        return Drawing(faults=diagnosis.faults, responses=responses_of(case))
     span = whole_of(case)
     groups, telling = ranked(case, sharing)
     first = max(min(telling, MOST_PLOTS), FEWEST)
@@ -74,6 +75,7 @@ def drawn_of(case: OpenRun, sharing: Sharing = EVERYTHING) -> Drawing:
         faults=diagnosis.faults,
         plots=tuple(replace(plot, source=text(plot.source), lines=_named(plot.lines, text)) for plot in plots if plot),
         marks=marks_in(case, span),
+        responses=responses_of(case),
         deadlines=tuple(_deadlines(case, span)),
         start_s=span[0],
         end_s=span[1],

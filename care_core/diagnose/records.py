@@ -188,6 +188,15 @@ def helps(odds: float | None, as_driven: float | None) -> bool:
     return odds is None or as_driven is None or odds > as_driven
 
 
+class Odds(Record):
+    """How likely every objective is met with an option at a value."""
+
+    value: float
+    p_ok: float
+    is_guess: bool
+    """Whether no training run came near the changes."""
+
+
 class Fix(Record):
     """A set of changes with its predicted outcome. `p_fixed`: probability that all objectives keep their thresholds."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from care_core.records import Record
 from care_core.text import LONG_S, seconds
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
@@ -51,3 +52,26 @@ def _nice(step: float) -> float:
     """The next round number: 1, 2, 2.5 or 5 times a power of ten."""
     power = float(10.0 ** math.floor(math.log10(step)))
     return next(nice * power for nice in _STEPS if nice * power >= step * (1 - 1e-9))
+
+
+class Scale(Record):
+    """The values of a parameter along an axis, as ratios where `is_log`."""
+
+    low: float
+    high: float
+    is_log: bool = False
+
+    def share(self, value: float) -> float:
+        """Where a value stands between both ends, 0 to 1."""
+        value = min(max(value, self.low), self.high)
+        if self.is_log:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    def ticks(self) -> tuple[float, ...]:
+        """Round values between the ends."""
+        if not self.is_log:
+            return value_ticks(self.low, self.high, 5)
+        decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+        values = (step * 10.0**decade for decade in decades for step in (1, 2, 5))
+        return tuple(value for value in values if self.low < value < self.high)

@@ -18,6 +18,7 @@ from care_core.report.comparison import CompareDocument, head_of, sections_of
 from care_core.report.document import FaultEntry, FixEntry, Report
 from care_core.report.path_drawing import MOST, paths_svg
 from care_core.report.plots import NOTHING_DRAWN, Drawing, Plot, plot_figure
+from care_core.report.responses import Response, response_figure
 from care_core.report.shared_causes import together
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.run import shown
@@ -76,6 +77,7 @@ def _pages() -> Environment:
     pages.globals |= {"words": STATUS_WORDS, "severities": SEVERITY_WORDS, "signs": _SIGNS}
     pages.filters |= {
         "clean": clean,
+        "curve": _curve,
         "figure": _figure,
         "log_time": log_time,
         "share": percent,
@@ -93,7 +95,7 @@ def _parts(report: Report, drawing: Drawing) -> Iterator[Part]:
         names = listed([str(_CODE.format(one.objective)) for one in faults])
         content = _causes(faults[-1], drawing, f"paths{number}")
         yield Part(f"causes{number}", Markup(f"Causes of {names}"), "causes", content)
-    yield Part("fix", "Fix", "fix", report.fix and _fix(report, report.fix))
+    yield Part("fix", "Fix", "fix", report.fix and _fix(report, report.fix, drawing))
     yield Part("signals", "Signals", "signals", drawing if drawing.plots else None)
     yield Part("account", "What happened", "account", report.account)
     if report.since is not None:
@@ -128,12 +130,22 @@ def _causes(fault: FaultEntry, drawing: Drawing, name: str) -> dict[str, Any]:
     return {"causes": fault.causes, "paths": paths, "drawn": min(MOST, len(fault.causes))}
 
 
-def _fix(report: Report, fix: FixEntry) -> dict[str, Any]:
+def _fix(report: Report, fix: FixEntry, drawing: Drawing) -> dict[str, Any]:
     objectives = {objective.name: objective for objective in report.objectives}
     rows = [(name, objectives[name].prediction(one), one.odds(fix.guess)) for name, one in fix.predicted.items()]
     others = [other.sentence(report.odds_as_driven) for other in fix.alternatives]
-    return {"rows": rows, "diff": report.diff.splitlines(), "apply": report.apply, "alternatives": others}
+    return {
+        "rows": rows,
+        "responses": drawing.responses,
+        "diff": report.diff.splitlines(),
+        "apply": report.apply,
+        "alternatives": others,
+    }
 
 
 def _figure(plot: Plot, drawing: Drawing) -> Markup:
     return Markup("\n".join(plot_figure(plot, drawing, f"plot{drawing.plots.index(plot) + 1}")))
+
+
+def _curve(response: Response, place: int) -> Markup:
+    return Markup("\n".join(response_figure(response, f"odds{place}")))

@@ -13,6 +13,7 @@ from care_core.diagnose.records import Fault
 from care_core.records import Record
 from care_core.report.axes import tick_time, time_ticks, value_ticks
 from care_core.report.marks import Mark
+from care_core.report.responses import Response
 from care_core.text import LONG_S, clean, figures, log_time
 
 Point = tuple[float, float]
@@ -88,6 +89,8 @@ class Drawing(Record):
     """What comes later does not set the scale: what is down is thrown about."""
     since: str = "the start of the log"
     """What the seconds count from: that of the log, unless several runs are laid over each other."""
+    responses: tuple[Response, ...] = ()
+    """How the odds answer to each parameter that the fix changes."""
 
 
 NOTHING_DRAWN = Drawing()

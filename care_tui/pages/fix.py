@@ -9,8 +9,9 @@ from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.worker import get_current_worker
 
-from care_core.application.case import Odds, changes_of, fixes
-from care_core.diagnose.records import Fix
+from care_core.application.case import changes_of, fixes
+from care_core.diagnose.records import Fix, Odds
+from care_core.report.responses import Response
 from care_core.text import clean, number_of
 from care_core.variables import Variable
 from care_tui.basket import nudged, parsed, possible
@@ -155,13 +156,13 @@ class FixPage(FiguredPage, DiagnosisPage):
             self._weigh(option)
             return [Row(Content("Asking what each value would bring..."))]
         room = self.room_of_figure()
-        return response_rows(option, odds, self._marks(option), room.width, room.height, self.glyphs)
+        return response_rows(Response(option, tuple(odds), self._marks(option)), room.width, room.height, self.glyphs)
 
-    def _marks(self, option: Variable) -> dict[float, str]:
+    def _marks(self, option: Variable) -> tuple[tuple[float, str], ...]:
         session = self.session
         marks = {session.reference(option): "reference", session.current(option): "as driven"}
         marks[session.basket.ticked.get(option.name)] = "ticked"
-        return {value: what for value, what in marks.items() if value is not None}
+        return tuple((value, what) for value, what in marks.items() if value is not None)
 
     def _weigh(self, option: Variable) -> None:
         """Have a thread ask for the odds of each value, and leave those of another option."""

@@ -128,7 +128,19 @@ def test_every_option_is_an_argument_in_python(said: str, told: str) -> None:
 def test_every_option_that_the_core_speaks_of_is_known_in_python() -> None:
     """What belongs to other commands than the public functions (an output, a campaign) is not told by them."""
     others = {"all", "alpha", "anonymous", "changed", "force", "json", "junit", "markdown", "memory", "notify-command"}
-    others |= {"out", "parquet", "positions", "runs", "schema", "target", "yaml", "no-history", "workers", "scheduler"}
+    others |= {
+        "out",
+        "over",
+        "parquet",
+        "positions",
+        "runs",
+        "schema",
+        "target",
+        "yaml",
+        "no-history",
+        "workers",
+        "scheduler",
+    }
     sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "care_core" / "diagnose").rglob("*.py"))
     sources += "".join((ROOT / "care_core" / "extract" / name).read_text() for name in ("read.py", "select.py"))
     options = set(re.findall(r"--([a-z-]+)", sources)) - others

@@ -13,8 +13,8 @@ from textual.dom import DOMNode
 from textual.pilot import Pilot
 from textual.widgets import Static
 
-from care_core.application.case import Case, Odds
-from care_core.diagnose.records import Circumstance, Diagnosis, Fault, PathNode
+from care_core.application.case import Case
+from care_core.diagnose.records import Circumstance, Diagnosis, Fault, Odds, PathNode
 from care_core.errors import ExitCode
 from care_core.records import replace
 from care_core.variables import Variable
