@@ -29,6 +29,8 @@ from care_tui.workspace import Workspace
 
 NAME_WIDTH = 26
 UNCHANGED, RESPONSE = "unchanged", "response"
+CURVE = "fix.curve"
+"""The id of the key that shows the curve."""
 Key = tuple[str, frozenset[tuple[str, float]]]
 """An option, and the changes beside which its values are asked for."""
 
@@ -49,6 +51,7 @@ class FixPage(FiguredPage, DiagnosisPage):
         Binding("plus,right_square_bracket", "nudge(1)", "More", key_display="+", id="fix.more"),
         Binding("minus,left_square_bracket", "nudge(-1)", "Less", key_display="-", id="fix.less"),
         Binding("equals_sign,i", "type_value", "Value", key_display="=", id="fix.value"),
+        Binding("z", "turn", "Curve", id=CURVE),
         Binding("a", "alternative", "Alternative", id="fix.alternative"),
         Binding("s", "suggestion", "Suggestion", show=False, id="fix.suggestion"),
         Binding("u", "undo", "Undo", show=False, id="fix.undo"),
@@ -56,6 +59,8 @@ class FixPage(FiguredPage, DiagnosisPage):
 
     def __init__(self, workspace: Workspace, *, id: str | None = None) -> None:
         super().__init__(workspace, id=id)
+        self._is_turned = False
+        """Whether the curve has the place of the prediction, where there is room for one of them."""
         self._responses: dict[Key, list[Odds]] = {}
         self._weighed: Key | None = None
         """What the thread is at that asks for the odds over an option's values."""
@@ -146,7 +151,9 @@ class FixPage(FiguredPage, DiagnosisPage):
 
     def _has_figure(self, option: Variable | None) -> bool:
         """Whether the odds over an option's values have a pane of their own."""
-        if option is None or not self.is_wide or not self.reader.has_room or self.session.fix_error is not None:
+        if option is None or not self.reader.has_room or self.session.fix_error is not None:
+            return False
+        if not (self.is_wide or self._is_turned):
             return False
         return bool(option.across(2)) and self._responses.get(self._key(option)) != []
 
@@ -254,6 +261,20 @@ class FixPage(FiguredPage, DiagnosisPage):
     def _set(self, option: Variable, value: float, current: float) -> None:
         self.session.basket.set(option.name, value, current=current)
         self.post_message(Decided())
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        if action == "turn" and self.is_wide:  # both are in view
+            return False
+        return super().check_action(action, parameters)
+
+    def label(self, binding: Binding) -> str:
+        return "Prediction" if binding.id == CURVE and self._is_turned else super().label(binding)
+
+    def action_turn(self) -> None:
+        """Show the curve in the prediction's place, or the other way round."""
+        self._is_turned = not self._is_turned
+        self.refresh_bindings()
+        self.show_text()
 
     def action_alternative(self) -> None:
         """Load the next fix that was found."""

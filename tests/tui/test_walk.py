@@ -353,7 +353,12 @@ async def test_a_wide_fix_draws_the_odds_over_the_values_of_a_parameter_and_asks
         assert [name for name, beside in asked if "LAND_SPEED" in beside] == ["WPNAV_SPEED"]
         await pilot.resize_terminal(80, 24)
         await settle(pilot)
-        assert "mission_time" in text(app)  # where it is narrow the prediction has the pane
+        assert "mission_time" in text(app)  # where it is narrow the prediction has the pane, until z turns it
+        await settle(pilot, "z")
+        assert text(app).startswith("WPNAV_SPEED, cm/s")
+        assert "z Prediction" in hints(app)
+        await settle(pilot, "z")
+        assert "mission_time" in text(app)
 
 
 async def test_slash_filters_and_escape_clears(make_app: MakeApp) -> None:
