@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
 
 from care_core.configs.driven import same_value
 from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import BY_ID
 from care_core.run import shown
+
+
+_ALIKE = 0.8
+"""Least likeness of a name to the one that is meant, of difflib."""
 
 
 def problem_at(
@@ -25,6 +30,11 @@ def problem_at(
     """A problem at an entry; `source` where it is not the rule's own."""
     where = (file.path, entry.line, entry.column, entry.name)
     return Problem(rule, severity, *where, text, hint, source or BY_ID[rule].source, others)
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """The known name that another is a slip of the pen for; empty where none is so near."""
+    return next(iter(get_close_matches(name, list(known), n=1, cutoff=_ALIKE)), "")
 
 
 def check(file: ConfigFile) -> Iterator[Problem]:

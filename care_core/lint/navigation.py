@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import UsageError, nearest
-from care_core.lint import choices, contradictions, foreign, lists, parsed, plugins, refused, sources, workable
+from care_core.lint import choices, contradictions, foreign, lists, localization, parsed, plugins, refused, slam, sources, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED, Renamed
@@ -79,6 +79,8 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     yield from choices.check(file, result, likely)
     yield from sources.check(file, result, likely)
     yield from refused.check(file, result, likely)
+    yield from localization.check(file)
+    yield from slam.check(file)
     yield from _unused(file, result)
     yield from values(file, result)
 

@@ -1,0 +1,112 @@
+"""SLAM toolbox: names, types, frames, and what keeps it from telling where the robot is."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+
+from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
+from care_core.errors import nearest
+from care_core.lint.generic import near, problem_at
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.readers import warning
+
+_NODE = re.compile(r"\w*slam_toolbox\w*")
+_DECIMALS = (
+    "transform_publish_period", "map_update_interval", "resolution", "max_laser_range", "min_laser_range",
+    "minimum_time_interval", "transform_timeout", "tf_buffer_duration", "minimum_travel_distance",
+    "minimum_travel_heading", "scan_buffer_maximum_scan_distance", "link_match_minimum_response_fine",
+    "link_scan_maximum_distance", "loop_search_maximum_distance", "loop_match_maximum_variance_coarse",
+    "loop_match_minimum_response_coarse", "loop_match_minimum_response_fine", "correlation_search_space_dimension",
+    "correlation_search_space_resolution", "correlation_search_space_smear_deviation", "loop_search_space_dimension",
+    "loop_search_space_resolution", "loop_search_space_smear_deviation", "distance_variance_penalty",
+    "angle_variance_penalty", "fine_search_angle_offset", "coarse_search_angle_offset", "coarse_angle_resolution",
+    "minimum_angle_penalty", "minimum_distance_penalty", "position_covariance_scale", "yaw_covariance_scale",
+)  # fmt: skip
+"""Numbers that its node of ROS 2 declares as decimal ones."""
+_OTHERS = (
+    "solver_plugin", "ceres_linear_solver", "ceres_preconditioner", "ceres_trust_strategy", "ceres_dogleg_type",
+    "ceres_loss_function", "odom_frame", "map_frame", "base_frame", "scan_topic", "mode", "map_file_name",
+    "map_start_pose", "map_start_at_dock", "map_name", "debug_logging", "throttle_scans", "stack_size_to_use",
+    "enable_interactive_mode", "interactive_mode", "use_map_saver", "use_scan_matching", "use_scan_barycenter",
+    "scan_buffer_size", "scan_queue_size", "do_loop_closing", "loop_match_minimum_chain_size",
+    "use_response_expansion", "use_sim_time", "use_lifecycle_manager", "paused_processing",
+    "paused_new_measurements", "localization_on_configure",
+)  # fmt: skip
+_MODES = ("mapping", "localization")
+_SOLVERS = ("solver_plugins::CeresSolver", "solver_plugins::GTSAMSolver", "solver_plugins::SpaSolver",
+            "solver_plugins::G2oSolver")  # fmt: skip
+_FRAMES = ("map_frame", "odom_frame", "base_frame")
+_COMMON = "slam_toolbox_common.cpp"
+
+Values = Mapping[str, Entry]
+
+
+def check(file: ConfigFile) -> Iterator[Problem]:
+    """What is wrong with the node of SLAM toolbox that a file of ROS 2 holds."""
+    found: dict[str, dict[str, Entry]] = {}
+    for entry in file.entries:
+        if PARAMETERS in entry.keys[1:-1]:
+            at = entry.keys.index(PARAMETERS)
+            if _NODE.fullmatch(entry.keys[at - 1]):
+                found.setdefault(entry.keys[at - 1], {})[".".join(entry.keys[at + 1 :])] = entry
+    for values in found.values():
+        yield from _names(file, values)
+        yield from _words(file, values)
+        yield from _frames(file, values)
+        yield from _numbers(file, values)
+
+
+def _names(file: ConfigFile, values: Values) -> Iterator[Problem]:
+    known = (*_DECIMALS, *_OTHERS)
+    for name, entry in values.items():
+        if name not in known and "." not in name and not name.startswith("bond_"):
+            meant = near(name, known)
+            text = f"{name} is not a parameter of slam_toolbox in any release from foxy to rolling."
+            hint = f"Did you mean {meant}?" if meant else "Leave it out."
+            yield problem_at("unknown-key", Severity.WARNING, file, entry, text, hint, _COMMON)
+        elif name in _DECIMALS and entry.kind == "int" and entry.number is not None:
+            text = f"{name} is an integer, declared is a decimal number: the node will not start."
+            yield problem_at("wrong-type", Severity.ERROR, file, entry, text, f"Write {entry.number:g}.0.", _COMMON)
+
+
+def _words(file: ConfigFile, values: Values) -> Iterator[Problem]:
+    """Words of which it knows a few; solvers of another package it takes as well."""
+    mode, solver = values.get("mode"), values.get("solver_plugin")
+    if mode is not None and mode.kind == "str" and mode.value not in _MODES and "$" not in str(mode.value):
+        text = f"mode is {mode.value}, which is none of its values: launch files and tools do not know it."
+        hint = f"They are {', '.join(_MODES)}. {nearest(str(mode.value), _MODES)}".strip()
+        yield warning("not-in-values", file, mode, text, hint, "the parameter files of slam_toolbox")
+    if solver is None or "$" in str(solver.value):
+        return
+    package = str(solver.value).partition("::")[0]
+    if solver.value not in _SOLVERS and (package == "solver_plugins" or nearest(package, ["solver_plugins"])):
+        text = f"solver_plugin is {solver.value}, which no package of slam_toolbox brings: the node exits."
+        hint = nearest(str(solver.value), _SOLVERS) or f"It is {_SOLVERS[0]} as it ships."
+        yield problem_at("plugin-name", Severity.ERROR, file, solver, text, hint, "solver_plugins.xml")
+
+
+def _frames(file: ConfigFile, values: Values) -> Iterator[Problem]:
+    seen: dict[str, Entry] = {}
+    for name in _FRAMES:
+        entry = values.get(name)
+        frame = "" if entry is None else str(entry.value).strip("/")
+        if entry is not None and frame in seen and "$" not in frame:
+            text = f"{seen[frame].keys[-1]} and {name} are both {frame}: no scan finds its place."
+            hint = "Map, odometry and robot are three frames (REP 105)."
+            yield warning("cannot-work", file, entry, text, hint, f"{_COMMON} asks tf for each", [seen[frame]])
+        elif entry is not None:
+            seen[frame] = entry
+
+
+def _numbers(file: ConfigFile, values: Values) -> Iterator[Problem]:
+    period, heading = values.get("transform_publish_period"), values.get("minimum_travel_heading")
+    if period is not None and period.number == 0:
+        text = "transform_publish_period is 0: it never tells where odom is on the map."
+        hint = "0.02 is usual, unless another node publishes that transform."
+        yield warning("cannot-work", file, period, text, hint, f"{_COMMON}, publishTransformLoop")
+    if heading is not None and heading.number is not None and heading.number > 2 * math.pi:
+        text = f"minimum_travel_heading is {heading.number:g} rad, more than a whole turn."
+        hint = f"Is it in degrees? {math.radians(heading.number):.4g} rad would be."
+        yield warning("wrong-unit", file, heading, text, hint, "an angle is at most 2 pi")
