@@ -12,7 +12,6 @@ from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import BY_ID
 from care_core.run import shown
 
-
 _ALIKE = 0.8
 """Least likeness of a name to the one that is meant, of difflib."""
 

@@ -9,7 +9,7 @@ from care_core.configs.driven import option_value, readable
 from care_core.configs.loading import split_name
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.errors import UsageError, nearest
-from care_core.lint import ardupilot, contradictions, generic, navigation, px4
+from care_core.lint import ardupilot, clashes, contradictions, generic, navigation, outputs, px4
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.reading import read_file
 from care_core.metadata.navigation import DISTRIBUTIONS
@@ -59,7 +59,8 @@ def _check_target(target: str) -> None:
 def _lint(name: str, target: str, schema: Schema | None) -> Linted:
     path, namespace = split_name(name)
     file, refused = read_file(path, namespace)
-    problems = [*refused, *generic.check(file), *_of_ecosystem(file, target)]
+    file, bytewise = (file, ()) if file.format.is_yaml else px4.read_as_numbers(file)
+    problems = [*refused, *bytewise, *generic.check(file), *_of_ecosystem(file, target)]
     if schema is not None:
         problems += _of_profile(file, schema)
     order = sorted(set(problems), key=lambda one: (one.line, one.column, one.rule, one.text))
@@ -77,6 +78,8 @@ def _of_ecosystem(file: ConfigFile, target: str) -> Iterator[Problem]:
     rules = px4 if is_px4 else ardupilot
     if rules.known(values) > 0.5:
         yield from rules.check(file, firmware)
+        yield from clashes.check(file, values, clashes.PX4 if is_px4 else clashes.ARDUPILOT)
+        yield from (outputs.px4 if is_px4 else outputs.ardupilot)(file, values)
 
 
 def _all_distributions() -> set[str]:

@@ -9,7 +9,19 @@ from collections.abc import Iterator, Sequence
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import UsageError, nearest
-from care_core.lint import choices, contradictions, foreign, lists, localization, parsed, plugins, refused, slam, sources, workable
+from care_core.lint import (
+    choices,
+    contradictions,
+    foreign,
+    lists,
+    localization,
+    parsed,
+    plugins,
+    refused,
+    slam,
+    sources,
+    workable,
+)
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED, Renamed

@@ -7,12 +7,14 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 
+from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.lint.documented import meant_instead, not_listed, share_known, unknown_bits
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import px4
 from care_core.metadata.fact import Fact
+from care_core.records import replace
 
 _VERSION = re.compile(r"^#\s*(?:Version:|Firmware: PX4)\s*v?(\d+\.\d+)(?P<build>.*)", re.MULTILINE)
 _EARLY = re.compile(r"alpha|beta|rc|dev", re.IGNORECASE)
@@ -21,6 +23,7 @@ _LISTS = f"{px4.SOURCE}s of {px4.RELEASES[0]} to {px4.RELEASES[-1]}"
 _TRANSLATED = "param_translation.cpp of PX4, which translates files of older releases"
 _FAR = 2.0
 """The firmware checks no range: what lies beyond one by less than this factor is worth a note alone."""
+_BYTEWISE = "MAVLink's two encodings of parameters: PX4 sends whole numbers byte by byte"
 _UNSET = (0.0, -1.0)
 """Values that say "off", "not known" or "not set" of many parameters."""
 
@@ -59,6 +62,26 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
             yield _elsewhere(file, entry, releases, is_told=is_told)
         elif not is_self_written(entry.name):
             yield from _value(file, entry, px4.facts_of(entry.name, releases))
+
+
+def read_as_numbers(file: ConfigFile) -> tuple[ConfigFile, tuple[Problem, ...]]:
+    """A file without its whole numbers where they were stored byte by byte as decimal ones, as MAVProxy stores those
+    of PX4: 1 is then next to 0, and -1 no number."""
+    whole = [entry for entry in file.entries if _is_whole(entry.name)]
+    broken = [entry for entry in whole if entry.number is not None and math.isnan(entry.number)]
+    if not broken or file.format is QGC_PARAMS:
+        return file, ()
+    text = f"{broken[0].name} is not a number, nor is any of the {len(whole)} whole numbers here what the vehicle has: "
+    text += "they were stored byte by byte as decimal ones."
+    hint = "Save the file with QGroundControl, or `param show` of PX4 itself. They are not judged here."
+    problem = problem_at("wrong-type", Severity.ERROR, file, broken[0], text, hint, _BYTEWISE)
+    kept = tuple(entry for entry in file.entries if entry not in whole)
+    return replace(file, entries=kept), (problem,)
+
+
+def _is_whole(name: str) -> bool:
+    facts = px4.facts_of(name)
+    return bool(facts) and all(fact.type in ("int", "bool") for fact in facts)
 
 
 def _number(release: str) -> tuple[int, ...]:

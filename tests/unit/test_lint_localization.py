@@ -46,7 +46,7 @@ def test_what_a_filter_cannot_fuse_or_join(tmp_path: Path, lines: tuple[str, ...
 def test_a_filter_that_is_set_up_raises_nothing(tmp_path: Path) -> None:
     diagonal = f"[{', '.join(['0.05'] * 15)}]"
     text = ekf(f"odom0_config: {ODOM}", "imu0: imu", f"imu0_config: {with_(5, 11, 12)}", "world_frame: odom",
-               f"process_noise_covariance: {diagonal}", "map_frame: map", "imu0_queue_size: 5", "my_own: 3")  # fmt: skip
+               f"process_noise_covariance: {diagonal}", "map_frame: map", "imu0_queue_size: 5", "mine: 3")  # fmt: skip
     assert told(tmp_path, text) == []
 
 

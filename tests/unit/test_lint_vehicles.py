@@ -1,0 +1,98 @@
+"""Settings of a vehicle that do not go together: what they are, and files that have them right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from care_core.lint.linting import lint
+from care_core.lint.problems import Problem
+
+COPTER = {
+    "FRAME_CLASS": 1, "MOT_SPIN_ARM": 0.1, "MOT_SPIN_MIN": 0.15, "ATC_RAT_RLL_P": 0.135, "FS_THR_ENABLE": 1,
+    "RCMAP_ROLL": 1, "RCMAP_PITCH": 2, "RCMAP_THROTTLE": 3, "RCMAP_YAW": 4, "FLTMODE_CH": 5, "AHRS_EKF_TYPE": 3,
+    "EK3_ENABLE": 1, "EK3_SRC1_POSXY": 3, "EK3_SRC1_YAW": 1, "GPS_TYPE": 1, "GPS_TYPE2": 0, "COMPASS_USE": 1,
+    "SERIAL1_PROTOCOL": 2, "SERIAL2_PROTOCOL": 2, "SERIAL3_PROTOCOL": 5, "SERVO1_FUNCTION": 33,
+    "SERVO2_FUNCTION": 34, "SERVO3_FUNCTION": 35, "SERVO4_FUNCTION": 36,
+}  # fmt: skip
+ROVER = {
+    "CRUISE_SPEED": 2, "CRUISE_THROTTLE": 50, "ATC_STR_RAT_P": 0.2, "ATC_STR_RAT_I": 0.2, "TURN_RADIUS": 0.9,
+    "SERVO1_FUNCTION": 26, "SERVO3_FUNCTION": 70,
+}  # fmt: skip
+PX4 = {
+    "MC_ROLLRATE_P": 0.15, "MC_PITCHRATE_P": 0.15, "MPC_XY_VEL_MAX": 12, "NAV_ACC_RAD": 2, "COM_DISARM_LAND": 2,
+    "CA_ROTOR_COUNT": 4, "PWM_MAIN_FUNC1": 101, "PWM_MAIN_FUNC2": 102, "PWM_MAIN_FUNC3": 103, "PWM_MAIN_FUNC4": 104,
+    "RC_MAP_ROLL": 1, "RC_MAP_PITCH": 2, "RC_MAP_THROTTLE": 3, "RC_MAP_YAW": 4,
+}  # fmt: skip
+RULES = ("contradiction", "cannot-work", "hinders", "wrong-unit")
+
+
+def found(tmp_path: Path, values: dict[str, float]) -> list[Problem]:
+    path = tmp_path / "a.param"
+    path.write_text("".join(f"{name},{value}\n" for name, value in values.items()))
+    (linted,) = lint([str(path)])
+    return [one for one in linted.problems if one.rule in RULES]
+
+
+@pytest.mark.parametrize("values", [COPTER, ROVER, PX4])
+def test_a_vehicle_that_has_them_right_is_left_alone(tmp_path: Path, values: dict[str, float]) -> None:
+    assert found(tmp_path, values) == []
+
+
+@pytest.mark.parametrize(
+    ("base", "values", "rule", "parameter", "says"),
+    [
+        (COPTER, {"FS_THR_ENABLE": 0}, "hinders", "FS_THR_ENABLE", "nothing is done when the radio is lost"),
+        (COPTER, {"MOT_SPIN_MIN": 0.4}, "cannot-work", "MOT_SPIN_MIN", "refuses to arm above 0.3"),
+        (COPTER, {"MOT_THST_HOVER": 35}, "wrong-unit", "MOT_THST_HOVER", "0.35, not 35"),
+        (COPTER, {"BATT2_MONITOR": 4, "BATT2_VOLT_MULT": 0}, "cannot-work", "BATT2_VOLT_MULT", "every voltage reads 0"),
+        (COPTER, {"RCMAP_YAW": 1}, "contradiction", "RCMAP_YAW", "both channel 1"),
+        (COPTER, {"RC7_OPTION": 41, "RC9_OPTION": 41}, "contradiction", "RC9_OPTION", "it refuses to arm"),
+        (COPTER, {"RC5_OPTION": 41}, "contradiction", "RC5_OPTION", "FLTMODE_CH chooses the mode"),
+        (COPTER, {"SERVO4_FUNCTION": 35}, "contradiction", "SERVO4_FUNCTION", "no output drives motor 4"),
+        (COPTER, {"EK3_ENABLE": 0}, "contradiction", "EK3_ENABLE", "AHRS_EKF_TYPE asks for EKF3"),
+        (COPTER, {"GPS_TYPE": 0}, "contradiction", "GPS_TYPE", "no GPS is on"),
+        (COPTER, {"SERIAL3_PROTOCOL": 2}, "contradiction", "GPS_TYPE", "no port listens to it"),
+        (COPTER, {"SERVO9_FUNCTION": 7, "SERVO9_MIN": 1600, "SERVO9_TRIM": 1500}, "cannot-work", "SERVO9_MIN", "above"),
+        (COPTER, {"RC2_MAX": 1400, "RC2_TRIM": 1500}, "cannot-work", "RC2_MAX", "Calibrate the radio"),
+        (
+            COPTER, {"FENCE_ENABLE": 1, "FENCE_TYPE": 7, "FENCE_ALT_MAX": 20, "RTL_ALT": 3000},
+            "contradiction", "RTL_ALT", "30 m, above the fence",
+        ),
+        (
+            COPTER, {"INS_HNTCH_ENABLE": 1, "INS_HNTCH_MODE": 1, "INS_HNTCH_FREQ": 80, "INS_HNTCH_BW": 160},
+            "contradiction", "INS_HNTCH_BW", "moves the notch up",
+        ),
+        (
+            COPTER, {"INS_HNTCH_ENABLE": 1, "INS_HNTCH_MODE": 3, "INS_HNTCH_REF": 0, "INS_HNTCH_FREQ": 80,
+                     "INS_HNTCH_BW": 40},
+            "contradiction", "INS_HNTCH_REF", "stays at INS_HNTCH_FREQ",
+        ),
+        (ROVER, {"SERVO3_FUNCTION": 56}, "contradiction", "SERVO1_FUNCTION", "no output has throttle"),
+        (PX4, {"PWM_MAIN_FUNC4": 103}, "contradiction", "CA_ROTOR_COUNT", "no output drives motor 4"),
+        (PX4, {"RC_MAP_YAW": 1}, "contradiction", "RC_MAP_YAW", "are both channel 1"),
+        (PX4, {"MAV_0_CONFIG": 102, "GPS_1_CONFIG": 102}, "contradiction", "GPS_1_CONFIG", "both port 102"),
+        (PX4, {"EKF2_HGT_REF": 1, "EKF2_GPS_CTRL": 5}, "contradiction", "EKF2_HGT_REF", "Add 2 to EKF2_GPS_CTRL"),
+        (PX4, {"BAT1_V_EMPTY": 13.2}, "wrong-unit", "BAT1_V_EMPTY", "more than any cell has"),
+        (PX4, {"GF_ACTION": 0, "GF_MAX_HOR_DIST": 300}, "hinders", "GF_ACTION", "does nothing"),
+    ],
+)  # fmt: skip
+def test_settings_that_do_not_go_together(
+    tmp_path: Path, base: dict[str, float], values: dict[str, float], rule: str, parameter: str, says: str
+) -> None:
+    problems = [one for one in found(tmp_path, base | values) if one.parameter == parameter]
+    assert [one.rule for one in problems] == [rule]
+    assert says in f"{problems[0].text} {problems[0].hint}"
+    assert problems[0].source
+
+
+def test_whole_numbers_that_were_stored_byte_by_byte_are_told_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.param"
+    kept = {name: value for name, value in PX4.items() if not name.startswith(("CA_", "PWM_", "RC_"))}
+    rows = [f"{name} {value}" for name, value in kept.items()]
+    path.write_text("\n".join([*rows, "RC_MAP_ROLL nan", "RC_MAP_PITCH 2.8e-45", "CA_ROTOR_COUNT 5.6e-45"]) + "\n")
+    (linted,) = lint([str(path)])
+    (problem,) = linted.problems
+    assert (problem.rule, problem.line) == ("wrong-type", 6)
+    assert "byte by byte" in problem.text
