@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
+from typing import TypeVar
 
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Kind
@@ -16,6 +18,7 @@ from care_core.metadata.aliases import aliases_of
 from care_core.metadata.ardupilot import Release
 from care_core.metadata.fact import Fact
 
+_T = TypeVar("_T")
 _VEHICLE_LINE = re.compile(
     r"#.*\b(?:ardu)?(copter|helicopter|multirotor|plane|rover|sub|tracker|blimp)\b", re.IGNORECASE
 )
@@ -26,6 +29,7 @@ _LETTERS = {
 }  # fmt: skip
 _KINDS: dict[str, Kind] = {"C": "copter", "P": "quadplane", "R": "rover", "S": "sub", "T": "tracker", "B": "blimp"}
 _LISTS = f"{ardupilot.SOURCE}s of 3.4 to 4.8"
+_NUMBER = re.compile(r"\d+")
 _HEAD = 12
 """Lines in which ground stations say of what vehicle a file is."""
 _RATIOS = ((100.0, "centimetres or hundredths"), (1000.0, "thousandths"))
@@ -35,6 +39,11 @@ _CHOICES, _GAPS = 4, 0.3
 """Least number of values of a list of choices, and the most of them that may be missing in between, as a share."""
 _SIMULATED = (10.0, 100.0)
 """Drivers of simulated sensors, which lists leave out."""
+_OLDER = frozenset({"ATC_ACCEL_RP_MAX", "ATC_RATE_RP_MAX", "FS_GPS_ENABLE", "MOT_SPIN_ARMED"})
+"""Names of Copter 3.3 and before that are like one of today which counts something else."""
+_OWN_DEFAULTS = {"EK2_ABIAS_P_NSE": 0.005, "ATC_ACCEL_Y_MAX": 110000.0}
+"""Defaults outside the documented ranges, of parameters that no bundled profile has (AP_NavEKF2.cpp,
+AC_AttitudeControl_Sub.h)."""
 _FAR = 10.0
 """Documented ranges are what is usual: what lies beyond the bound by less than this factor is worth a note alone."""
 
@@ -48,10 +57,18 @@ def releases_of(file: ConfigFile, target: str) -> tuple[tuple[Release, ...], boo
     asked = _asked(*_words(target)) if target else _asked(*_header(file.text))
     if asked:
         return asked, True
-    names = {entry.name for entry in file.entries}
-    counts: Counter[Release] = Counter(release for name in names for release in ardupilot.known_in(name))
+    known = {entry.name: ardupilot.known_in(entry.name) for entry in file.entries}
+    groups = {(_NUMBER.sub("", name), one.vehicle) for name, releases in known.items() for one in releases}
+    likely = _most(Counter(vehicle for _, vehicle in groups))
+    counts = Counter(one for releases in known.values() for one in releases if one.vehicle in likely)
+    return tuple(one for one in ardupilot.ALL if one in _most(counts)), False
+
+
+def _most(counts: Counter[_T]) -> set[_T]:
+    """What was counted most often. The vehicle comes first, and sixteen channels count once: a file older than any
+    list has most of its names in common with the oldest, whatever vehicle that is of."""
     most = max(counts.values(), default=0)
-    return tuple(release for release in ardupilot.ALL if counts[release] == most and most), False
+    return {one for one, count in counts.items() if count == most}
 
 
 def _words(target: str) -> tuple[str, str]:
@@ -89,9 +106,10 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
 
 
 def _unknown(file: ConfigFile, entry: Entry) -> Problem:
-    meant = meant_instead(entry.name, {one.name for one in file.entries}, ardupilot.names())
+    is_older = entry.name in _OLDER
+    meant = "" if is_older else meant_instead(entry.name, {one.name for one in file.entries}, ardupilot.names())
     if meant:
-        text = f"No release of ArduPilot has a parameter {entry.name}."
+        text = f"No release of ArduPilot from 3.4 on has a parameter {entry.name}."
         return problem_at("unknown-key", Severity.WARNING, file, entry, text, f"Did you mean {meant}?", _LISTS)
     text = f"ArduPilot's lists have no parameter {entry.name}: a script's, a custom build's, or one before 3.4."
     return problem_at("unknown-key", Severity.NOTE, file, entry, text, "Check its spelling.", _LISTS)
@@ -169,7 +187,7 @@ def _outside(file: ConfigFile, entry: Entry, value: float, facts: Sequence[Fact]
     """A number outside the documented ranges. 0 and -1 mean "off" or "not set" for many parameters and are let be."""
     fact = facts[-1]
     low, high = fact.low or 0.0, fact.high or 0.0
-    if value in (0.0, -1.0):
+    if value in (0.0, -1.0) or _is_default(entry.name, value):
         return
     unit = f" {fact.unit}" if fact.unit else ""
     text = f"{entry.name} is {value:g}{unit}, outside {low:g} to {high:g}."
@@ -180,6 +198,13 @@ def _outside(file: ConfigFile, entry: Entry, value: float, facts: Sequence[Fact]
             yield problem_at("wrong-unit", Severity.WARNING, file, entry, text, hint, fact.source)
             return
     yield problem_at("out-of-range", Severity.NOTE, file, entry, text, "The range is what is usual.", fact.source)
+
+
+def _is_default(name: str, value: float) -> bool:
+    """Whether the firmware of some vehicle has this value by itself: a few of its defaults are outside its ranges."""
+    own = name.removeprefix("Q_")
+    defaults = (_OWN_DEFAULTS.get(own), *(ardupilot.firmware_default(own, kind) for kind in ardupilot.VEHICLES))
+    return any(math.isclose(one, value, rel_tol=1e-6) for one in defaults if one is not None)
 
 
 def known(names: Collection[str]) -> float:

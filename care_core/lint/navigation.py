@@ -268,13 +268,18 @@ def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact], ros: str) -> I
         text = f"{entry.keys[-1]} is {number:g}, which is none of its values."
         yield problem_at("not-in-values", Severity.WARNING, file, entry, text, f"They are {listed}.", fact.source)
     elif all(_is_outside(number, one) for one in facts):
-        low, high = ("any" if bound is None else f"{bound:g}" for bound in (fact.low, fact.high))
-        text = f"{entry.keys[-1]} is {number:g}, outside {low} to {high}: the node takes the bound."
+        text = f"{entry.keys[-1]} is {number:g}, {_bounds(fact)}: the node takes the bound."
         yield problem_at("out-of-range", Severity.WARNING, file, entry, text, "", fact.source)
     elif _ANGLE_TOLERANCE.search(entry.keys[-1]) and math.pi < abs(number) <= 360 and number > 2 * math.pi:
         text = f"{entry.keys[-1]} is {number:g} rad, more than a whole turn."
         hint = f"Is it in degrees? {math.radians(number):.4g} rad would be."
         yield problem_at("wrong-unit", Severity.WARNING, file, entry, text, hint, "an angle is at most 2 pi")
+
+
+def _bounds(fact: Fact) -> str:
+    if fact.low is not None and fact.high is not None:
+        return f"outside {fact.low:g} to {fact.high:g}"
+    return f"below {fact.low:g}" if fact.high is None else f"above {fact.high:g}"
 
 
 def _is_outside(number: float, fact: Fact) -> bool:

@@ -22,6 +22,9 @@ from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import BY_ID
 
 _PARAMETER = re.compile(r"\s*([^\s,]+)(?:\s*,\s*|\s+)(\S+)")
+_COMMAND = re.compile(r"\s*param\s+set(?:-default)?\s+(?:-s\s+)?(\S+)\s+(\S+)")
+"""How the shell of PX4 and its airframes set a parameter; the other lines of such a file are the shell's."""
+_CONFLICT = re.compile(r"(<{7}|\|{7}|={7}|>{7})(\s|$)")
 _TAGS = {"int": "int", "float": "float", "bool": "bool", "str": "str", "seq": "list"}
 _DICTITEMS = "dictitems"
 _GROUPS = "groups"
@@ -102,13 +105,20 @@ def _text(node: Node) -> str:
 
 def _of_parameters(path: Path, format: Dialect, text: str) -> tuple[ConfigFile, tuple[Problem, ...]]:
     entries, problems = [], []
-    for number, line in enumerate(text.splitlines(), start=1):
+    lines = text.splitlines()
+    pair = _command if any(_COMMAND.match(line) for line in lines) else _pair
+    for number, line in enumerate(lines, start=1):
+        if _CONFLICT.match(line):
+            problems += [_conflict(path, number)] if line.startswith("<") else []
+            continue
         body = line.partition("#")[0].rstrip()
         for flag in FLAGS:
             body = body.removesuffix(flag).rstrip()
         if not body.strip():
             continue
-        found = _row(line) if format is QGC_PARAMS else _pair(body)
+        found = _row(line) if format is QGC_PARAMS else pair(body)
+        if found is None and pair is _command:
+            continue
         if found is None:
             problems.append(syntax(path, number, 1, "", "This line is not a parameter.", "A line is NAME,VALUE."))
             continue
@@ -125,6 +135,16 @@ def _of_parameters(path: Path, format: Dialect, text: str) -> tuple[ConfigFile, 
             continue
         entries.append(Entry((name,), held, number, column, kind))
     return ConfigFile(path, format, text, tuple(entries)), tuple(problems)
+
+
+def _conflict(path: Path, line: int) -> Problem:
+    text = "A merge conflict was left here: both sides are read, and of each name the last line counts."
+    return syntax(path, line, 1, "", text, "Keep one side.")
+
+
+def _command(body: str) -> tuple[str, str, int, str] | None:
+    match = _COMMAND.match(body)
+    return None if match is None else (match[1], match[2], match.start(1) + 1, "float")
 
 
 def _pair(body: str) -> tuple[str, str, int, str] | None:

@@ -15,6 +15,8 @@ from care_core.text import clean, wrapped
 SCHEMA_ID: Final = "care.lint/1"
 _SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 _INDENT = "    "
+_FEW, _NAMED = 3, 12
+"""Problems up to which each has its own paragraph, and how many of the others of one are named."""
 
 
 class FindingEntry(Document, kw_only=True):
@@ -80,13 +82,28 @@ def _entry(problem: Problem) -> FindingEntry:
 
 
 def lint_text(linted: Sequence[Linted]) -> str:
-    """One paragraph a problem: where, how bad, what, what to do, and the source."""
-    return "".join(f"{line}\n" for one in linted for problem in one.problems for line in _lines(problem))
+    """One paragraph a problem: where, how bad, what, what to do, and the source. Problems of one file that differ in
+    nothing but the parameter share a paragraph where they are several."""
+    return "".join(f"{line}\n" for one in linted for problems in _alike(one) for line in _lines(*problems))
 
 
-def _lines(problem: Problem) -> Iterator[str]:
+def _alike(linted: Linted) -> Iterator[tuple[Problem, ...]]:
+    """The problems in their order, those that say the same with the first of them."""
+    same: dict[tuple[str, ...], list[Problem]] = {}
+    for problem in linted.problems:
+        text = problem.text.replace(problem.parameter, "") if problem.parameter else problem.text
+        same.setdefault((problem.rule, problem.severity.value, text, problem.hint, problem.source), []).append(problem)
+    groups = [group for several in same.values() for group in ([several] if several[_FEW:] else zip(several))]
+    yield from sorted((tuple(group) for group in groups), key=lambda group: linted.problems.index(group[0]))
+
+
+def _lines(problem: Problem, *others: Problem) -> Iterator[str]:
     yield clean(f"{problem.path}:{problem.line}:{problem.column}: {problem.severity.value} [{problem.rule}]")
     yield from wrapped(f"{problem.text} {problem.hint}".strip(), _INDENT)
+    if others:
+        named = "; ".join(f"{clean(one.parameter)}, line {one.line}".lstrip(", ") for one in others[:_NAMED])
+        more = f"; and {len(others) - _NAMED} more" if others[_NAMED:] else ""
+        yield from wrapped(f"The same holds of {len(others)} more: {named}{more}.", _INDENT)
     yield from wrapped(f"source: {problem.source}", _INDENT)
 
 

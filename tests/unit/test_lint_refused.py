@@ -45,7 +45,7 @@ def test_a_long_list_is_not_written_out(tmp_path: Path) -> None:
 
 
 def test_lists_of_names_and_of_switches_are_of_one_type(tmp_path: Path) -> None:
-    assert told(tmp_path, node("ekf_filter_node", "odom0_config: [true, false, no]", "names: [a, 'b', c]")) == []
+    assert told(tmp_path, node("ekf_filter_node", "flags: [true, false, no]", "names: [a, 'b', c]")) == []
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from care_core.lint.linting import lint
-from care_core.lint.problems import Problem
+from care_core.lint.linting import Linted, lint
+from care_core.lint.problems import Problem, Severity
+from care_core.report.linting import lint_text
 
 COPTER = {
     "FRAME_CLASS": 1, "MOT_SPIN_ARM": 0.1, "MOT_SPIN_MIN": 0.15, "ATC_RAT_RLL_P": 0.135, "FS_THR_ENABLE": 1,
@@ -96,3 +97,44 @@ def test_whole_numbers_that_were_stored_byte_by_byte_are_told_once(tmp_path: Pat
     (problem,) = linted.problems
     assert (problem.rule, problem.line) == ("wrong-type", 6)
     assert "byte by byte" in problem.text
+
+
+def linted(tmp_path: Path, text: str) -> Linted:
+    path = tmp_path / "a.param"
+    path.write_text(text)
+    (found,) = lint([str(path)])
+    return found
+
+
+def test_commands_that_set_parameters_are_read(tmp_path: Path) -> None:
+    """Airframes of PX4 and what was typed into its shell."""
+    text = "#!/bin/sh\n. ${R}etc/init.d/rc.mc_defaults\nparam set-default MC_ROLLRATE_P 1.5\n"
+    found = linted(tmp_path, f"{text}param set MPC_XY_P 0.9\nset MIXER quad_x\nparam set-default NAV_ACC_RAD 2 # m\n")
+    assert [(one.name, one.line) for one in found.file.entries] == [
+        ("MC_ROLLRATE_P", 3), ("MPC_XY_P", 4), ("NAV_ACC_RAD", 6),
+    ]  # fmt: skip
+    assert [one.rule for one in found.problems] == ["out-of-range"]
+
+
+def test_a_merge_conflict_is_named_once_and_both_sides_are_read(tmp_path: Path) -> None:
+    text = "ANGLE_MAX,3000\n<<<<<<< HEAD\nRTL_ALT,1500\n=======\nRTL_ALT,2000\n>>>>>>> other\n"
+    found = linted(tmp_path, text)
+    assert [(one.line, one.rule) for one in found.problems] == [(2, "syntax"), (5, "duplicate")]
+    assert "merge conflict" in found.problems[0].text
+
+
+def test_a_default_of_the_firmware_is_no_finding_where_its_range_leaves_it_out(tmp_path: Path) -> None:
+    rows = {**COPTER, "PSC_VELZ_IMAX": 1000, "ATC_RAT_YAW_FLTE": 2.5, "EK2_ABIAS_P_NSE": 0.005}
+    assert linted(tmp_path, "".join(f"{name},{value}\n" for name, value in rows.items())).problems == ()
+
+
+def test_a_file_older_than_the_lists_is_taken_for_the_vehicle_whose_names_it_has(tmp_path: Path) -> None:
+    """Sub 3.4 is the one list that still has names of channels which all vehicles had."""
+    old = "".join(f"RC{number}_REV,1\nRC{number}_FUNCTION,0\n" for number in range(5, 12))
+    text = f"RTL_ALT,1500\nLAND_SPEED,50\nSUPER_SIMPLE,0\nRTL_LOIT_TIME,5000\n{old}MOT_SPIN_ARMED,70\n"
+    found = linted(tmp_path, text)
+    assert not [one for one in found.problems if one.parameter in ("RTL_ALT", "LAND_SPEED", "SUPER_SIMPLE")]
+    (armed,) = (one for one in found.problems if one.parameter == "MOT_SPIN_ARMED")
+    assert armed.severity is Severity.NOTE  # 70 of it is no 70 of MOT_SPIN_ARM
+    assert lint_text([found]).count("RC10_REV") == 1
+    assert "The same holds of 13 more: RC5_FUNCTION, line 6;" in " ".join(lint_text([found]).split())
