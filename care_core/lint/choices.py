@@ -28,8 +28,10 @@ class Choice(NamedTuple):
     ros: str = "ros2"
     releases: str = ""
     """Where only these releases have the list, as the tables write them."""
+    severity: Severity = Severity.ERROR
 
 
+_LASERS = ("beam", "likelihood_field", "likelihood_field_prob")
 _REFUSED = "the node will not start"
 CHOICES: tuple[Choice, ...] = (
     Choice(("MPPIController",), "motion_model", ("DiffDrive", "Omni", "Ackermann"), "MPPI does not start",
@@ -43,6 +45,15 @@ CHOICES: tuple[Choice, ...] = (
            "obstacle_layer.cpp", "ros1"),
     Choice(("amcl",), "robot_model_type", ("nav2_amcl::DifferentialMotionModel", "nav2_amcl::OmniMotionModel"),
            "amcl does not start", "amcl_node.cpp since humble loads a plugin of that name", releases="humble-rolling"),
+    Choice(("SmacPlannerHybrid",), "motion_model_for_search", ("DUBIN", "REEDS_SHEPP"), "the planner does not start",
+           "node_hybrid.cpp of nav2_smac_planner, initMotionModel"),
+    Choice(("amcl",), "laser_model_type", _LASERS, "likelihood_field counts instead",
+           "amcl_node.cpp, createLaserObject", severity=Severity.WARNING),
+    Choice(("amcl",), "laser_model_type", _LASERS, "likelihood_field counts instead", "amcl_node.cpp", "ros1",
+           severity=Severity.WARNING),
+    Choice(("TebLocalPlannerROS",), "type", ("point", "circular", "two_circles", "line", "polygon"),
+           "the robot counts as a point", "teb_local_planner_ros.cpp, getRobotFootprintFromParamServer", "ros1",
+           severity=Severity.WARNING),
 )  # fmt: skip
 _OWN = re.compile(r"nav2_amcl::|^\w+$")
 """Of plugins: only words without a package and names of Nav2's own; another package may bring more."""
@@ -70,11 +81,11 @@ def _is_refused(entry: Entry, choice: Choice) -> bool:
     word = entry.value
     if not isinstance(word, str) or entry.kind != "str" or word in choice.words or _REPLACED.search(word):
         return False
-    return choice.owners != ("amcl",) or bool(_OWN.search(word))
+    return choice.name != "robot_model_type" or bool(_OWN.search(word))
 
 
 def _refused(file: ConfigFile, entry: Entry, choice: Choice) -> Problem:
     text = f"{entry.keys[-1]} is {entry.value}, which is none of its values: {choice.why}."
     hint = f"They are {', '.join(choice.words)}."
     meant = nearest(str(entry.value), choice.words)
-    return problem_at("not-in-values", Severity.ERROR, file, entry, text, f"{hint} {meant}".strip(), choice.source)
+    return problem_at("not-in-values", choice.severity, file, entry, text, f"{hint} {meant}".strip(), choice.source)

@@ -200,7 +200,9 @@ def _clauses(when: str, number: str) -> tuple[Clause, ...]:
 def _holds(clause: Clause, values: Mapping[str, Entry]) -> bool:
     left, relation, right = clause
     first = _number(left, values)
-    second = _number(right, values) if right[0].isupper() else float(right)
+    if right in ("true", "false"):
+        return left in values and values[left].value == right
+    second = _number(right, values) if right[0].isalpha() else float(right)
     return first is not None and second is not None and RELATIONS[relation][1](first, second)
 
 

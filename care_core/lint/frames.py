@@ -36,6 +36,17 @@ def _bases(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         yield warning("contradiction", file, entry, text, "Give all the same.", source, others[:1])
 
 
+def _moving(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Costmaps in the frame of the robot itself: what was seen moves along with it."""
+    for reader in held.of(COSTMAP):
+        entry, base = reader.values.get("global_frame"), reader.values.get("robot_base_frame")
+        own = {"base_link", "base_footprint"} | ({_frame(base)} if base is not None else set())
+        if entry is not None and _frame(entry) in own:
+            text = f"global_frame is {_frame(entry)}, the robot's own: what was seen moves along with it."
+            hint = "Give it odom or map."
+            yield warning("cannot-work", file, entry, text, hint, "costmap_2d_ros.cpp keeps obstacles in that frame")
+
+
 def _frame(entry: Entry) -> str:
     return str(entry.value).strip("/")
 
@@ -58,4 +69,4 @@ def _postdated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield warning("hinders", file, entry, text, "1 is usual: give it what the transforms lag.", source)
 
 
-RULES = (_bases, _postdated)
+RULES = (_bases, _moving, _postdated)

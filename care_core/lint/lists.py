@@ -3,6 +3,7 @@ stand beside the list instead of below the name."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -41,7 +42,16 @@ LISTS: tuple[PluginList, ...] = (
         ("static_layer", "StaticLayer"), ("obstacle_layer", "ObstacleLayer"), ("inflation_layer", "InflationLayer"),
     )),
     PluginList(COSTMAP, "filters"),
+    PluginList("docking_server", "dock_plugins"),
 )  # fmt: skip
+_SINGLE: tuple[PluginList, ...] = (
+    PluginList("controller_server", "goal_checker_plugin", (("goal_checker", ""),)),
+    PluginList("controller_server", "progress_checker_plugin", (("progress_checker", ""),)),
+    PluginList("waypoint_follower", "waypoint_task_executor_plugin", (("wait_at_waypoint", ""),)),
+)
+"""Names of one plugin alone."""
+_KINDS = (("GoalChecker", "goal_checker"), ("ProgressChecker", "progress_checker"), ("PathHandler", "path_handler"))
+"""What is in the name of a class, and in that of the list which loads it."""
 _DWB = "DWBLocalPlanner"
 _BY_DEFAULT = spanned("foxy-kilted", "ros2")
 """Since lyrical a controller without a class is MPPI's (parameter_handler.hpp of nav2_controller)."""
@@ -61,13 +71,78 @@ def classless(file: ConfigFile, result: Scoped, shown: frozenset[str]) -> Iterat
     held = {split(entry) for entry in file.entries}
     anywhere = {keys[-2] for keys in held if keys[-1] == "plugin" and _is_of_any_node(keys)}
     for place in result.places:
-        one = next((one for one in LISTS if (one.owner,) == place.owners and one.key == place.name), None)
-        if one is None or place.entry.kind != "list" or not _is_read(one, shown):
+        every = (*LISTS, *_SINGLE)
+        one = next((one for one in every if (one.owner,) == place.owners and one.key == place.name), None)
+        if one is None or not _is_read(one, shown) or re.search(r"[$<{]", str(place.entry.value)):
             continue
         names = words_of(place.entry)
+        if one in LISTS and place.entry.kind == "str":
+            yield _text(file, place, names)
+        if place.entry.kind != ("str" if one in _SINGLE else "list"):
+            continue
         lacking = [name for name in names if (*place.scope, name, "plugin") not in held and name not in anywhere]
         if lacking and names != one.names():
             yield _classless(file, place, lacking)
+
+
+def _text(file: ConfigFile, place: Place, names: Sequence[str]) -> Problem:
+    text = f"{place.name} is a string, declared is a list of strings: the node will not start."
+    hint = f"Write [{', '.join(repr(name) for name in names)}]."
+    source = f"{STACKS['ros2']} declare a list of strings"
+    return problem_at("wrong-type", Severity.ERROR, file, place.entry, text, hint, source)
+
+
+def by_default(file: ConfigFile, shown: frozenset[str]) -> Iterator[Problem]:
+    """Parts without a class that a default list loads, with values of another class than the default one.
+
+    Args:
+        shown: the releases that somebody or its plugins say the file is for; empty where nothing says so.
+    """
+    values = {split(entry): entry for entry in file.entries}
+    parts: dict[Keys, dict[Keys, Entry]] = {}
+    for keys, entry in values.items():
+        if PARAMETERS in keys[1:-2]:
+            end = keys.index(PARAMETERS) + 2
+            parts.setdefault(keys[:end], {})[keys[end:]] = entry
+    for (*above, name), below in parts.items():
+        one = next((one for one in LISTS if one.owner == above[-2] and name in one.names()), None)
+        if one is None or ("plugin",) in below or words_of(values.get((*above, one.key))) not in ((), one.names()):
+            continue
+        kind = dict(one.defaults)[name]
+        if kind and (kind != _DWB or (shown or _BY_DEFAULT) <= _BY_DEFAULT):
+            yield from _defaulted(file, name, kind, below)
+
+
+def _defaulted(file: ConfigFile, name: str, kind: str, below: Mapping[Keys, Entry]) -> Iterator[Problem]:
+    unread = [keys for keys in below if not navigation.known("ros2", kind, ".".join(keys)) and len(keys) == 1]
+    if len(unread) >= _SEVERAL:
+        entry = below[unread[0]]
+        text = f"{name} has no class, and is a {kind} then, which does not read {unread[0][0]} and "
+        text += f"{len(unread) - 1} more."
+        hint = f"Write plugin with the class below {name}."
+        yield problem_at("cannot-work", Severity.WARNING, file, entry, text, hint, _CLASSLESS)
+
+
+def spare(file: ConfigFile) -> Iterator[Problem]:
+    """Plugins of a node that none of its lists names."""
+    values = {split(entry): entry for entry in file.entries}
+    for keys, entry in values.items():
+        if keys[-1] != "plugin" or len(keys) < _SEVERAL + 2 or keys[-3] != PARAMETERS:
+            continue
+        scope, node, name = keys[:-2], keys[-4], keys[-2]
+        lists = [one for one in (*LISTS, *_SINGLE) if one.owner == node]
+        named = {word for one in lists for word in words_of(values.get((*scope, one.key))) or _unwritten(one)}
+        if not lists or name in named or any(re.search(r"[$<{]", word) for word in named):
+            continue
+        kind = next((part for word, part in _KINDS if word in str(entry.value)), "")
+        key = next((one.key for one in lists if kind in one.key and one.key.startswith(kind)), lists[0].key)
+        text = f"Nothing loads {name}: no list of {node} names it."
+        yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
+
+
+def _unwritten(one: PluginList) -> tuple[str, ...]:
+    """What a list names where it is not written; a name alone that a list has replaced names nothing then."""
+    return one.names() if one in LISTS or one.owner not in {each.owner for each in LISTS} else ()
 
 
 def _is_of_any_node(keys: Keys) -> bool:
@@ -84,7 +159,7 @@ def _classless(file: ConfigFile, place: Place, names: list[str]) -> Problem:
     what = "the costmap" if place.owners == (COSTMAP,) else place.owners[0]
     below, their, them = ("each of these names", "their", "them") if names[1:] else (names[0], "its", "it")
     text = f"{place.name} names {', '.join(names)}, and nothing here says {their} class: {what} will not start."
-    hint = f"Write plugin with the class below {below}, or leave {them} out of the list."
+    hint = f"Write plugin with the class below {below}, or leave {them} out."
     return problem_at("cannot-work", Severity.WARNING, file, place.entry, text, hint, _CLASSLESS)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Problem, Severity
-from care_core.lint.readers import Reader, Readers, warning
-from care_core.lint.scopes import words_of
+from care_core.lint.readers import Reader, Readers, numbers, warning
+from care_core.lint.scopes import split, words_of
 
 _NODES = ("collision_monitor", "collision_detector")
 _TYPES = {
@@ -15,6 +15,8 @@ _TYPES = {
     "observation_sources": ("scan", "pointcloud", "range", "polygon", "costmap"),
 }
 """By list of parts: what a part may be, in any release."""
+_LEAST = 6
+"""Numbers of the smallest polygon."""
 _SOURCE = "collision_monitor_node.cpp, getPolygons and configureSources"
 
 
@@ -43,6 +45,38 @@ def _shapeless(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield warning("cannot-work", file, entry, text, hint, _SOURCE)
 
 
+def _points(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Polygons with half a corner, or fewer than three."""
+    for reader in held.of("Polygon"):
+        entry = reader.values.get("points")
+        count = len(numbers(entry))
+        if entry is not None and count and (count % 2 or count < _LEAST):
+            text = f"points of {reader.name()} has {count} numbers: the node will not start."
+            hint = "Write x and y of each corner, of at least three."
+            yield problem_at("cannot-work", Severity.ERROR, file, entry, text, hint, "polygon.cpp, getParameters")
+
+
+def _unheard(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Sources that a list names and nothing describes, where another is described that no list names."""
+    for reader in held.of(*_NODES):
+        entry = reader.values.get("observation_sources")
+        parts = dict.fromkeys(name.partition(".")[0] for name in _around(file, reader) if "." in name)
+        listed = {word for key in _TYPES for word in words_of(reader.values.get(key))}
+        spare = [part for part in parts if part not in listed and f"{part}.topic" in _around(file, reader)]
+        missing = [name for name in words_of(entry) if name not in parts]
+        if entry is not None and missing and spare:
+            text = f"observation_sources names {missing[0]}, which nothing describes, and not {spare[0]}: the node "
+            text += "listens to a laser on scan."
+            yield warning("cannot-work", file, entry, text, f"Is {spare[0]} meant?", _SOURCE)
+
+
+def _around(file: ConfigFile, reader: Reader) -> set[str]:
+    """What stands below a node, by names with dots, whoever reads it."""
+    size = len(reader.scope)
+    keys = (split(entry) for entry in file.entries)
+    return {".".join(one[size:]) for one in keys if one[:size] == reader.scope}
+
+
 def _typed(reader: Reader) -> set[str]:
     return {key.rpartition(".")[0] for key in reader.values if key.endswith(".type")}
 
@@ -57,4 +91,4 @@ def _circular(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield warning("contradiction", file, out, text, hint, "collision_monitor_node.cpp", [entry])
 
 
-RULES = (_types, _shapeless, _circular)
+RULES = (_types, _shapeless, _circular, _points, _unheard)

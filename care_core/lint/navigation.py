@@ -15,6 +15,7 @@ from care_core.lint import (
     foreign,
     lists,
     localization,
+    misnamed,
     parsed,
     plugins,
     refused,
@@ -88,6 +89,9 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         yield from _nodes(file, shown, is_told=bool(told))
         yield from plugins.check(file, distribution)
         yield from lists.classless(file, result, shown)
+        yield from lists.by_default(file, shown)
+        yield from lists.spare(file)
+    yield from misnamed.check(file, result)
     yield from choices.check(file, result, likely)
     yield from sources.check(file, result, likely)
     yield from refused.check(file, result, likely)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
@@ -24,6 +25,7 @@ def check(file: ConfigFile) -> Iterator[Problem]:
     for entry in file.entries:
         if entry.kind == "list" and PARAMETERS in entry.keys[:-1]:
             yield from _mixed(file, entry)
+            yield from _nested(file, entry)
         elif entry.keys[-1] == "use_sim_time" and entry.kind == "str" and PARAMETERS in entry.keys[:-1]:
             yield from _quoted(file, entry)
     yield from _outside(file)
@@ -32,9 +34,10 @@ def check(file: ConfigFile) -> Iterator[Problem]:
 def _quoted(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
     """A clock that is told in quotes. What a launch file of Nav2 brings replaces it."""
     word = str(entry.value).lower()
-    if word in ("true", "false"):
+    if not re.search(r"[$<{]", word):
         text = "use_sim_time is a string, declared is true or false: a node that is given it so will not start."
-        hint = f"Write {word} without quotes, unless the launch file sets it."
+        plain = word if word in ("true", "false") else "true or false"
+        hint = f"Write {plain} without quotes, unless the launch file sets it."
         yield problem_at("wrong-type", Severity.WARNING, file, entry, text, hint, "time_source.cpp of rclcpp")
 
 
@@ -50,6 +53,15 @@ def _mixed(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
     if len(plain) == len(items):
         hint = f"Write [{', '.join(repr(one) for one in plain)}]." if len(plain) <= _SHORT else _DECIMALS
     yield problem_at("wrong-type", Severity.ERROR, file, entry, text, hint, f"{_PARSER}, parse_value")
+
+
+def _nested(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
+    """Lists in a list, such as the corners of a footprint, which Nav2 reads from a text."""
+    items = _items(str(entry.value))
+    if len(items) > 1 and any(isinstance(one, list) for one in items):
+        text = f"{entry.keys[-1]} is a list of lists: ROS 2 refuses the whole file, no node starts with it."
+        hint = "Put it in quotes, where the node reads a text, or write one flat list."
+        yield problem_at("wrong-type", Severity.ERROR, file, entry, text, hint, f"{_PARSER}, parse_file_events")
 
 
 def _items(text: str) -> list[object]:

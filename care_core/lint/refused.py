@@ -7,6 +7,7 @@ import ast
 import re
 from collections.abc import Iterator
 
+from care_core.lint.contradictions import reach
 from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.lint.readers import Readers, readers, warning
 from care_core.lint.scopes import COSTMAP, Scoped
@@ -14,6 +15,9 @@ from care_core.metadata.navigation import spanned
 
 _ONE_OF_TWO = spanned("galactic-iron", "ros2")
 _CORNERS = 3
+_LARGEST_M = 10.0
+"""No robot of a costmap reaches so far from its centre."""
+_METRES = "lengths of ROS are in metres (REP 103)"
 _TREES = ("default_nav_to_pose_bt_xml", "default_nav_through_poses_bt_xml")
 """default_bt_xml_filename of foxy and galactic is not among them: Nav2's own launch files replace what stands there."""
 _BARE = re.compile(r"[\w.-]+\.xml")
@@ -59,6 +63,19 @@ def _shapes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             )
 
 
+def _far(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Robots of the size of a house."""
+    for reader in held.of(COSTMAP):
+        footprint, radius = reader.values.get("footprint"), reader.values.get("robot_radius")
+        far = None if footprint is None else reach(footprint)
+        if footprint is not None and far is not None and far > _LARGEST_M:
+            text = f"A corner of footprint is {far:g} m from the robot's centre."
+            yield warning("wrong-unit", file, footprint, text, "Is it in centimetres? It is in metres.", _METRES)
+        elif radius is not None and (radius.number or 0.0) > _LARGEST_M and not reader.has_footprint():
+            text = f"robot_radius is {radius.number:g} m."
+            yield warning("wrong-unit", file, radius, text, "Is it in centimetres? It is in metres.", _METRES)
+
+
 def _corners(entry: Entry) -> int | None:
     """How many points a footprint has; None where it is not a list of points."""
     try:
@@ -69,4 +86,4 @@ def _corners(entry: Entry) -> int | None:
     return len(held) if is_points else None
 
 
-RULES = (_trees, _shapes)
+RULES = (_trees, _shapes, _far)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from itertools import combinations
 from typing import NamedTuple
 
-from care_core.lint import critics, frames, layers, monitor, refused, smoother, sources, window
+from care_core.lint import critics, docks, frames, layers, monitor, refused, smoother, sources, teb, window
 from care_core.lint.contradictions import inscribed_radius
 from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.lint.readers import (
@@ -115,6 +115,10 @@ ABOVE: tuple[Above, ...] = (
           "static_layer.cpp, interpretValue"),
     Above((COSTMAP,), ("robot_radius",), "the robot has no size, and plans touch obstacles",
           "costmap_2d_ros.cpp draws a circle of it where no footprint is set", rule="hinders"),
+    Above(("amcl",), tuple(f"{odom}alpha{number}" for odom in ("", "odom_") for number in range(1, 6)),
+          "it is a noise, of which amcl takes the root", "the motion models of amcl", zero=True),
+    Above(("SmacPlannerHybrid",), ("minimum_turning_radius",), "there is no curve to search along",
+          "ros-navigation/navigation2 #4845"),
     Above(INFLATIONS, ("inflation_radius",), "plans may touch obstacles", "inflation_layer.cpp", rule="contradiction"),
 )  # fmt: skip
 
@@ -229,6 +233,18 @@ def _considered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 )
                 hint = "Give the costmap a footprint, or switch it off."
                 yield warning("cannot-work", file, switch, text, hint, "cost_critic.cpp, obstacles_critic.cpp")
+
+
+def _weights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Shares of what a laser sees that are more than all of it."""
+    for reader in held.of("amcl"):
+        for name in ("z_hit", "z_short", "z_max", "z_rand", "laser_z_hit", "laser_z_short", "laser_z_max",
+                     "laser_z_rand"):  # fmt: skip
+            entry = reader.values.get(name)
+            if entry is not None and entry.number is not None and not 0 <= entry.number <= 1:
+                text = f"{name} is {entry.number:g}, and it is a share of what the laser sees, from 0 to 1."
+                hint = "z_hit, z_short, z_max and z_rand make 1 together."
+                yield warning("cannot-work", file, entry, text, hint, "the laser models of amcl weigh by it")
 
 
 def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -390,6 +406,6 @@ def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
 
 RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
     _simulated, _predicted, _considered, _settles, _starts, _progress, window.window, _cells, _sizes, *layers.RULES,
-    _goal_checks, _unknown_space, _drawn, *smoother.RULES, *monitor.RULES, *critics.RULES, *frames.RULES,
-    *sources.RULES, *refused.RULES, _clocks,
+    _goal_checks, _unknown_space, _drawn, _weights, *docks.RULES, *teb.RULES, *smoother.RULES, *monitor.RULES,
+    *critics.RULES, *frames.RULES, *sources.RULES, *refused.RULES, _clocks,
 )  # fmt: skip

@@ -649,7 +649,8 @@ def test_a_value_in_the_unit_of_another_release_is_converted(
 @pytest.mark.parametrize("value", ["5.0", "5000"])
 @pytest.mark.parametrize("beside", ["", RECOVERIES])
 def test_no_error_rests_on_a_release_that_is_only_likely(tmp_path: Path, value: str, beside: str) -> None:
-    older = node("bt_navigator", "default_bt_xml_filename: a.xml") + node("controller_server", "goal_checker_plugin: a")
+    older = node("bt_navigator", "default_bt_xml_filename: a.xml")
+    older += node("controller_server", "goal_checker_plugin: goal_checker")
     found = findings(tmp_path, node("map_saver", f"save_map_timeout: {value}") + older + beside)
     assert [one.rule for one in found if one.severity != Severity.NOTE] == []
 
