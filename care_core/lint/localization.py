@@ -92,9 +92,10 @@ def _unread(file: ConfigFile, values: Values, known: tuple[str, ...]) -> Iterato
             continue
         meant = near(name, [f"{of_source[1]}_{one}" for one in _SETTINGS] if of_source else known)
         if of_source or meant:
-            text = f"{name} is not a parameter of robot_localization in any release from noetic to rolling."
-            hint = f"Did you mean {meant}?" if meant else "Leave it out."
-            yield problem_at("unknown-key", Severity.WARNING, file, entry, text, hint, _ROS_FILTER)
+            text = f"No parameter {name} of robot_localization is known."
+            hint = f"Did you mean {meant}?" if meant else "Leave it out, unless a release of yours has it."
+            severity = Severity.WARNING if meant else Severity.NOTE
+            yield problem_at("unknown-key", severity, file, entry, text, hint, _ROS_FILTER)
 
 
 def _sources(file: ConfigFile, values: Values) -> Iterator[Problem]:

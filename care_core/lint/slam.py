@@ -32,7 +32,10 @@ _OTHERS = (
     "enable_interactive_mode", "interactive_mode", "use_map_saver", "use_scan_matching", "use_scan_barycenter",
     "scan_buffer_size", "scan_queue_size", "do_loop_closing", "loop_match_minimum_chain_size",
     "use_response_expansion", "use_sim_time", "use_lifecycle_manager", "paused_processing",
-    "paused_new_measurements", "localization_on_configure",
+    "paused_new_measurements", "localization_on_configure", "restamp_tf", "min_pass_through", "occupancy_threshold",
+    "check_min_dist_and_heading_precisely", "lifelong_search_use_tree", "lifelong_minimum_score", "lifelong_iou_match",
+    "lifelong_node_removal_score", "lifelong_overlap_score_scale", "lifelong_constraint_multiplier",
+    "lifelong_nearby_penalty", "lifelong_candidates_scale",
 )  # fmt: skip
 _MODES = ("mapping", "localization")
 _SOLVERS = ("solver_plugins::CeresSolver", "solver_plugins::GTSAMSolver", "solver_plugins::SpaSolver",
@@ -59,13 +62,15 @@ def check(file: ConfigFile) -> Iterator[Problem]:
 
 
 def _names(file: ConfigFile, values: Values) -> Iterator[Problem]:
+    """Names that are a slip of the pen, and whole numbers: releases and forks add names of their own."""
     known = (*_DECIMALS, *_OTHERS)
     for name, entry in values.items():
         if name not in known and "." not in name and not name.startswith("bond_"):
             meant = near(name, known)
-            text = f"{name} is not a parameter of slam_toolbox in any release from foxy to rolling."
-            hint = f"Did you mean {meant}?" if meant else "Leave it out."
-            yield problem_at("unknown-key", Severity.WARNING, file, entry, text, hint, _COMMON)
+            if meant and meant not in values:
+                text = f"No parameter {name} of slam_toolbox is known."
+                hint = f"Did you mean {meant}?"
+                yield problem_at("unknown-key", Severity.WARNING, file, entry, text, hint, _COMMON)
         elif name in _DECIMALS and entry.kind == "int" and entry.number is not None:
             text = f"{name} is an integer, declared is a decimal number: the node will not start."
             yield problem_at("wrong-type", Severity.ERROR, file, entry, text, f"Write {entry.number:g}.0.", _COMMON)
