@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from care_core.profile.schema import Schema
 
 _VEHICLES = ("copter", "plane", "rover", "sub", "tracker", "blimp", "px4")
+_MOST_KNOWN = 0.5
+"""The share of its names above which a file is taken for a vehicle's."""
 _MAY_BE_ELSEWHERE = frozenset({"unknown-key", "misplaced-key", "not-loaded"})
 
 
@@ -28,6 +30,8 @@ class Linted(Record):
 
     file: ConfigFile
     problems: tuple[Problem, ...]
+    unknown: int = 0
+    """Values of nodes, plugins and vehicles that no rule knows."""
 
 
 def lint(names: Sequence[str], target: str = "", schema: Schema | None = None) -> tuple[Linted, ...]:
@@ -64,7 +68,14 @@ def _lint(name: str, target: str, schema: Schema | None) -> Linted:
     if schema is not None:
         problems += _of_profile(file, schema)
     order = sorted(set(problems), key=lambda one: (one.line, one.column, one.rule, one.text))
-    return Linted(file, tuple(order))
+    return Linted(file, tuple(order), _unknown(file))
+
+
+def _unknown(file: ConfigFile) -> int:
+    if file.format.is_yaml:
+        return navigation.unknown(file)
+    names = {entry.name for entry in file.entries}
+    return 0 if max(px4.known(names), ardupilot.known(names)) > _MOST_KNOWN else len(file.entries)
 
 
 def _of_ecosystem(file: ConfigFile, target: str) -> Iterator[Problem]:
@@ -76,7 +87,7 @@ def _of_ecosystem(file: ConfigFile, target: str) -> Iterator[Problem]:
     firmware = "" if target in _all_distributions() else target
     is_px4 = firmware.startswith("px4") if firmware else px4.known(values) > ardupilot.known(values)
     rules = px4 if is_px4 else ardupilot
-    if rules.known(values) > 0.5:
+    if rules.known(values) > _MOST_KNOWN:
         yield from rules.check(file, firmware)
         yield from clashes.check(file, values, clashes.PX4 if is_px4 else clashes.ARDUPILOT)
         yield from (outputs.px4 if is_px4 else outputs.ardupilot)(file, values)

@@ -57,19 +57,28 @@ _MOST_RADIANS = 2 * math.pi
 Values = Mapping[str, Entry]
 
 
+def is_of_localization(values: Values) -> bool:
+    """Whether they are the values of a filter, or of navsat_transform."""
+    return is_filter(values) or _is_navsat(values)
+
+
+def _is_navsat(values: Values) -> bool:
+    return "magnetic_declination_radians" in values or {"wait_for_datum", "yaw_offset"} <= set(values)
+
+
 def check(file: ConfigFile) -> Iterator[Problem]:
     """What is wrong with the nodes of robot_localization that a file holds."""
-    for values in _nodes(file):
+    for values in nodes(file):
         if is_filter(values):
             yield from _unread(file, values, _FILTER)
             yield from _sources(file, values)
             yield from _of_filter(file, values)
-        elif "magnetic_declination_radians" in values or {"wait_for_datum", "yaw_offset"} <= set(values):
+        elif _is_navsat(values):
             yield from _unread(file, values, _NAVSAT)
             yield from _of_navsat(file, values)
 
 
-def _nodes(file: ConfigFile) -> Iterator[Values]:
+def nodes(file: ConfigFile) -> Iterator[Values]:
     """The values of each node, of a file of ROS 1 those of each part."""
     found: dict[tuple[str, ...], dict[str, Entry]] = {}
     for entry in file.entries:

@@ -101,6 +101,14 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     yield from values(file, result)
 
 
+def unknown(file: ConfigFile) -> int:
+    """How many values of a file are of nodes and plugins that nobody here knows: nothing is said of them."""
+    judged = {id(entry) for each in localization.nodes(file) if localization.is_of_localization(each)
+              for entry in each.values()}  # fmt: skip
+    others = [one.entry for one in scoped(file).places if not one.owners]
+    return sum(id(entry) not in judged and not slam.is_of_slam(entry) for entry in others)
+
+
 def _no_parameters(file: ConfigFile, result: Scoped) -> Problem | None:
     """A file of something else that names nodes of Nav2: the modes of system_modes, a launch, or values that nodes
     would read, had they the key that ROS 2 asks for."""

@@ -50,15 +50,20 @@ def check(file: ConfigFile) -> Iterator[Problem]:
     """What is wrong with the node of SLAM toolbox that a file of ROS 2 holds."""
     found: dict[str, dict[str, Entry]] = {}
     for entry in file.entries:
-        if PARAMETERS in entry.keys[1:-1]:
+        if is_of_slam(entry):
             at = entry.keys.index(PARAMETERS)
-            if _NODE.fullmatch(entry.keys[at - 1]):
-                found.setdefault(entry.keys[at - 1], {})[".".join(entry.keys[at + 1 :])] = entry
+            found.setdefault(entry.keys[at - 1], {})[".".join(entry.keys[at + 1 :])] = entry
     for values in found.values():
         yield from _names(file, values)
         yield from _words(file, values)
         yield from _frames(file, values)
         yield from _numbers(file, values)
+
+
+def is_of_slam(entry: Entry) -> bool:
+    """Whether a value is of the node of SLAM toolbox."""
+    keys = entry.keys
+    return PARAMETERS in keys[1:-1] and bool(_NODE.fullmatch(keys[keys.index(PARAMETERS) - 1]))
 
 
 def _names(file: ConfigFile, values: Values) -> Iterator[Problem]:

@@ -13,8 +13,8 @@ _CHECKED = "teb_config.cpp of teb_local_planner, checkParameters"
 _BROKEN = "cannot-work"
 _SPEEDS = ("max_vel_x", "max_vel_x_backwards", "max_vel_theta", "acc_lim_x", "acc_lim_theta")
 CLASHES: tuple[Clash, ...] = (
-    Clash("dt_hysteresis >= dt_ref", "dt_hysteresis ({dt_hysteresis}) is not below dt_ref ({dt_ref}): the trajectory "
-          "is resized over and over.", "A tenth of dt_ref is usual.", _CHECKED),
+    Clash("dt_hysteresis >= dt_ref", "dt_hysteresis ({dt_hysteresis}) is not below dt_ref ({dt_ref}): no point of a "
+          "trajectory is ever taken out.", "A tenth of dt_ref is usual.", _CHECKED),
     Clash("inflation_dist <= min_obstacle_dist; inflation_dist > 0", "inflation_dist ({inflation_dist} m) is not above "
           "min_obstacle_dist ({min_obstacle_dist} m): it has no effect.",
           "Make it larger, or 0 where nothing is to be inflated.", "optimal_planner.cpp of teb_local_planner",

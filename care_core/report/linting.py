@@ -108,7 +108,7 @@ def _lines(problem: Problem, *others: Problem) -> Iterator[str]:
 
 
 def counted(linted: Sequence[Linted]) -> str:
-    """How many findings of each severity in how many files."""
+    """How many findings of each severity in how many files, and whether most of what these hold is not judged."""
     findings = [problem for one in linted for problem in one.problems]
     parts = []
     for severity in Severity:
@@ -116,7 +116,10 @@ def counted(linted: Sequence[Linted]) -> str:
         if count:
             parts.append(f"{count} {severity.value}{'' if count == 1 else 's'}")
     files = f"{len(linted)} file{'' if len(linted) == 1 else 's'}"
-    return f"{', '.join(parts) or 'nothing found'} in {files}"
+    strange = [one for one in linted if 2 * one.unknown > len(one.file.entries)]
+    where = "which" if len(strange) == len(linted) else f"{len(strange)} of which"
+    more = f", most values of {where} belong to nothing that care knows" if strange else ""
+    return f"{', '.join(parts) or 'nothing found'} in {files}{more}"
 
 
 def lint_sarif(linted: Sequence[Linted], version: str) -> dict[str, Any]:

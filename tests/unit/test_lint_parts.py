@@ -9,6 +9,7 @@ import pytest
 
 from care_core.lint.linting import lint
 from care_core.lint.problems import Problem
+from care_core.report.linting import counted
 from tests.nav2_files import findings, node
 
 DOCKS = (
@@ -130,3 +131,18 @@ def test_planners_frames_and_sizes_of_ros_1(tmp_path: Path, text: str, rule: str
     (found,) = lint([str(path)])[0].problems
     assert found.rule == rule
     assert says in f"{found.text} {found.hint}"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (node("my_driver", "port: /dev/ttyUSB0", "baud: 115200"), ", most values of which belong to nothing"),
+        (node("amcl", "alpha1: 0.2", "max_beams: 60") + node("my_driver", "baud: 115200"), ""),
+        (node("slam_toolbox", "resolution: 0.05"), ""),
+        (node("ekf_filter_node", "odom0: /odom", f"odom0_config: [{', '.join(['true'] * 15)}]"), ""),
+    ],
+)  # fmt: skip
+def test_that_nothing_was_found_is_said_with_what_was_not_judged(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "nav2.yaml"
+    path.write_text(text)
+    assert counted(lint([str(path)])).endswith(f"1 file{f'{says} that care knows' if says else ''}")
