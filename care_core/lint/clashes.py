@@ -83,7 +83,7 @@ ARDUPILOT: tuple[Clash, ...] = (
     Clash("{n}_PWM_MAX <= 0; {n}_PWM_MIN > 0", f"Of {{n}}_PWM_MIN and {{n}}_PWM_MAX one is set: {_ARMING}.",
           "Set both, or none.", "AP_MotorsMulticopter.cpp, check_mot_pwm_params", _BROKEN, numbers=("MOT", "Q_M")),
     Clash("FRAME_CLASS = 0; MOT_SPIN_ARM >= 0", f"FRAME_CLASS is 0: no motor is mixed, and {_ARMING}.",
-          "Say which frame it is: 1 has four motors, 2 six.", "Copter: Check frame class", _BROKEN),
+          "Say which frame it is: 1 has four motors, 2 six.", "Copter: Check frame class", _BROKEN, _NOTE),
     Clash("PILOT_SPEED_UP <= 0", f"PILOT_SPEED_UP is {{PILOT_SPEED_UP}}: the pilot cannot climb, and {_ARMING}.",
           "It is in cm/s: 250 is usual.", "ArduCopter/AP_Arming.cpp", _BROKEN),
     Clash("H_RSC_MODE = 0", f"H_RSC_MODE is 0: nothing drives the rotor, and {_ARMING}.",

@@ -44,7 +44,7 @@ def _moving(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if entry is not None and _frame(entry) in own:
             text = f"global_frame is {_frame(entry)}, the robot's own: what was seen moves along with it."
             hint = "Give it odom or map."
-            yield warning("cannot-work", file, entry, text, hint, "costmap_2d_ros.cpp keeps obstacles in that frame")
+            yield warning("hinders", file, entry, text, hint, "costmap_2d_ros.cpp keeps obstacles in that frame")
 
 
 def _frame(entry: Entry) -> str:

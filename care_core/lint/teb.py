@@ -10,7 +10,7 @@ from care_core.lint.readers import Readers
 
 _TEB = "TebLocalPlannerROS"
 _CHECKED = "teb_config.cpp of teb_local_planner, checkParameters"
-_BROKEN = "cannot-work"
+_BROKEN, _HINDERS = "cannot-work", "hinders"
 _SPEEDS = ("max_vel_x", "max_vel_x_backwards", "max_vel_theta", "acc_lim_x", "acc_lim_theta")
 CLASHES: tuple[Clash, ...] = (
     Clash("dt_hysteresis >= dt_ref", "dt_hysteresis ({dt_hysteresis}) is not below dt_ref ({dt_ref}): no point of a "
@@ -20,21 +20,22 @@ CLASHES: tuple[Clash, ...] = (
           "Make it larger, or 0 where nothing is to be inflated.", "optimal_planner.cpp of teb_local_planner",
           "dead-key"),
     Clash("weight_optimaltime <= 0", "weight_optimaltime is {weight_optimaltime}: nothing draws the robot on.",
-          "It must be above 0, also where weight_shortest_path is used.", _CHECKED, _BROKEN),
+          "It must be above 0, also where weight_shortest_path is used.", _CHECKED, _HINDERS),
     Clash("min_samples < 3", "min_samples is {min_samples}: no trajectory of so few points can be planned.",
           "3 is the default.", _CHECKED, _BROKEN),
     Clash("max_vel_x_backwards <= 0", "max_vel_x_backwards is {max_vel_x_backwards}: what TEB does then is undefined.",
-          "Keep it above 0, and raise weight_kinematics_forward_drive against driving backwards.", _CHECKED),
+          "Keep it above 0, and raise weight_kinematics_forward_drive against driving backwards.", _CHECKED,
+          _HINDERS),
     Clash("weight_adapt_factor < 1", "weight_adapt_factor is {weight_adapt_factor}: obstacles count less with every "
-          "round.", "It must be 1 or more.", _CHECKED),
+          "round.", "It must be 1 or more.", _CHECKED, _HINDERS),
     Clash("cmd_angle_instead_rotvel = true; wheelbase = 0", "cmd_angle_instead_rotvel is on, and wheelbase is 0: there "
           "is no steering angle.", "Give it the distance of the axles.", _CHECKED, _BROKEN),
     Clash("cmd_angle_instead_rotvel = true; min_turning_radius = 0", "cmd_angle_instead_rotvel is on, and "
           "min_turning_radius is 0: a car is planned like a robot that turns in place.",
-          "Give it the least radius that the wheels allow.", _CHECKED),
+          "Give it the least radius that the wheels allow.", _CHECKED, _HINDERS),
     *(
         Clash(f"{name} <= penalty_epsilon; {name} > 0", f"{name} ({{{name}}}) is not above penalty_epsilon "
-              "({penalty_epsilon}): its bound turns negative.", "Raise the one or lower the other.", _CHECKED)
+              "({penalty_epsilon}): its bound turns negative.", "Raise the one or lower the other.", _CHECKED, _HINDERS)
         for name in _SPEEDS
     ),
 )  # fmt: skip

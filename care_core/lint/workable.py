@@ -118,7 +118,7 @@ ABOVE: tuple[Above, ...] = (
     Above(("amcl",), tuple(f"{odom}alpha{number}" for odom in ("", "odom_") for number in range(1, 6)),
           "it is a noise, of which amcl takes the root", "the motion models of amcl", zero=True),
     Above(("SmacPlannerHybrid",), ("minimum_turning_radius",), "there is no curve to search along",
-          "ros-navigation/navigation2 #4845"),
+          "node_hybrid.cpp of nav2_smac_planner takes the arc sine of sqrt(2) / (2 * radius)"),
     Above(INFLATIONS, ("inflation_radius",), "plans may touch obstacles", "inflation_layer.cpp", rule="contradiction"),
 )  # fmt: skip
 
@@ -244,7 +244,7 @@ def _weights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             if entry is not None and entry.number is not None and not 0 <= entry.number <= 1:
                 text = f"{name} is {entry.number:g}, and it is a share of what the laser sees, from 0 to 1."
                 hint = "z_hit, z_short, z_max and z_rand make 1 together."
-                yield warning("cannot-work", file, entry, text, hint, "the laser models of amcl weigh by it")
+                yield warning("out-of-range", file, entry, text, hint, "the laser models of amcl weigh by it")
 
 
 def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:

@@ -48,7 +48,7 @@ BEHAVIORS = (
          "nothing here says its class: waypoint_follower will not start"),
         (node("behaviour_server", *BEHAVIORS), "unknown-key", "warning", "Did you mean behavior_server?"),
         (node("amcl", "alpha1: -0.2"), "cannot-work", "warning", "takes the root"),
-        (node("amcl", "z_hit: 5.0"), "cannot-work", "warning", "from 0 to 1"),
+        (node("amcl", "z_hit: 5.0"), "out-of-range", "warning", "from 0 to 1"),
         (node("amcl", "laser_model_type: likelihood-field"), "not-in-values", "warning", "likelihood_field counts"),
         (node("amcl", "use_sim_time: 'yes please'"), "wrong-type", "warning", "Write true or false without quotes"),
         (node("local_costmap", "footprint: [[0.2, 0.2], [0.2, -0.2], [-0.2, 0.0]]").replace(
@@ -95,9 +95,9 @@ def of_teb(tmp_path: Path, values: dict[str, str], name: str = "TebLocalPlannerR
     [
         ({"dt_hysteresis": "0.3"}, "contradiction", "is not below dt_ref (0.3)"),
         ({"inflation_dist": "0.1"}, "dead-key", "is not above min_obstacle_dist (0.2 m)"),
-        ({"weight_optimaltime": "0"}, "cannot-work", "nothing draws the robot on"),
+        ({"weight_optimaltime": "0"}, "hinders", "nothing draws the robot on"),
         ({"min_samples": "2"}, "cannot-work", "no trajectory of so few points"),
-        ({"acc_lim_x": "0.1"}, "contradiction", "acc_lim_x (0.1) is not above penalty_epsilon (0.1)"),
+        ({"acc_lim_x": "0.1"}, "hinders", "acc_lim_x (0.1) is not above penalty_epsilon (0.1)"),
         ({"cmd_angle_instead_rotvel": "true", "wheelbase": "0.0"}, "cannot-work", "the distance of the axles"),
         ({"footprint_model": "{type: lines}"}, "not-in-values", "the robot counts as a point"),
     ],
@@ -120,7 +120,7 @@ def test_a_part_of_move_base_that_is_misspelt_is_named(tmp_path: Path) -> None:
     [
         ("base_local_planner: teb_local_planner/TebLocalPlanner\ncontroller_frequency: 5.0\n", "plugin-name",
          "Did you mean teb_local_planner/TebLocalPlannerROS?"),
-        ("local_costmap:\n  global_frame: base_link\n  robot_base_frame: base_link\n", "cannot-work", "moves along"),
+        ("local_costmap:\n  global_frame: base_link\n  robot_base_frame: base_link\n", "hinders", "moves along"),
         ("local_costmap:\n  footprint: [[15.0, 0.2], [0.15, -0.2], [-0.15, 0.0]]\n  update_frequency: 5.0\n",
          "wrong-unit", "Is it in centimetres?"),
     ],
