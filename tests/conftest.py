@@ -51,14 +51,26 @@ def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
     return f"{argname}_of_{len(val)}" if isinstance(val, (str, bytes)) and len(val) > LONGEST_ID else None
 
 
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all workers of this run share: it lies above the folder of each."""
+    own = tmp_path_factory.getbasetemp()
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+
 @pytest.fixture(autouse=True)
-def _own_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hide the developer's home folder and terminal from the tests."""
+def _own_home(tmp_path: Path, shared_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide the developer's home folder and terminal from the tests.
+
+    The cache alone outlives a test, as it does an operator's runs: what it holds is never out of date, and to check
+    fourteen profiles anew took a third of a triage.
+    """
     home = tmp_path / "home"
     home.mkdir()
     monkeypatch.setenv("HOME", str(home))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(home / ".config"))
     monkeypatch.setenv("XDG_DATA_HOME", str(home / ".local"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(shared_folder / "cache"))
     for name in ("CARE_DEBUG", "NO_COLOR"):
         monkeypatch.delenv(name, raising=False)
 
@@ -73,16 +85,15 @@ def recorded() -> Path:
 
 
 @pytest.fixture(scope="session")
-def planted(tmp_path_factory: pytest.TempPathFactory) -> Profile:
+def planted(shared_folder: Path) -> Profile:
     """A profile trained on 250 missions of the robot in `planted`, written and read as an installed one is."""
     from care_core.learn.train import train
     from care_core.profile.model import write_model
     from care_core.profile.store import Profile
     from tests.planted import SCHEMA, SETTINGS, fly_many
 
-    # Workers share the folder above their own: the first to come trains, the others wait for it.
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "planted"
+    # The first worker to come trains, the others wait for it.
+    folder = shared_folder / "planted"
     folder.mkdir(exist_ok=True)
     with (folder / "lock").open("w") as lock:
         flock(lock, LOCK_EX)

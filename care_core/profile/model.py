@@ -9,7 +9,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -42,6 +42,8 @@ MODEL_FILE, ARRAYS_FILE = "model.json", "mechanisms.npz"
 _LARGEST = 1e15
 """Of any number of a mechanism: what it computes from larger ones has no number."""
 _NEXT_ARRAYS = f"{ARRAYS_FILE}.next"
+_KEPT = 4
+"""Models that a process keeps: as many kinds of vehicles as a fleet has, of 20 to 50 MB each."""
 PRIOR = "prior:"
 """Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
 
@@ -189,14 +191,8 @@ def read_model(folder: Path) -> Model:
     """
     path = folder / MODEL_FILE
     try:
-        record = read_json(_ModelFile, _content(path))
-        mechanisms = _mechanisms(record.mechanisms, _read_arrays(folder, record.arrays_sha256))
-        graph = CausalGraph(
-            record.nodes,
-            frozenset((e.source, e.target) for e in record.edges if e.kind == "directed"),
-            frozenset((e.source, e.target) for e in record.edges if e.kind == "bidirected"),
-        )
-        _check_references(record)
+        content = _content(path)
+        return _model(content, _arrays_of(folder, _record(content).arrays_sha256))
     except OSError as err:
         raise ProfileError(
             f"The profile has no readable model: {err.strerror or err}.",
@@ -211,10 +207,9 @@ def read_model(folder: Path) -> Model:
             hint="Train the profile again with 'care train'.",
             where=str(folder),
         ) from err
-    return _to_model(record, graph, mechanisms)
 
 
-def _read_arrays(folder: Path, sha256: str) -> Mapping[str, FloatArray]:
+def _arrays_of(folder: Path, sha256: str) -> bytes:
     """The arrays that a `model.json` belongs to; they may not have got their name yet when writing was broken off."""
     content = _content(folder / ARRAYS_FILE)
     following = folder / _NEXT_ARRAYS
@@ -222,6 +217,30 @@ def _read_arrays(folder: Path, sha256: str) -> Mapping[str, FloatArray]:
         content = _content(following) if following.is_file() else b""
         if hashlib.sha256(content).hexdigest() != sha256:
             raise ValueError(f"{ARRAYS_FILE} is not the one that model.json was written with")
+    return content
+
+
+@lru_cache(maxsize=_KEPT)
+def _record(content: bytes) -> _ModelFile:
+    return read_json(_ModelFile, content)
+
+
+@lru_cache(maxsize=_KEPT)
+def _model(content: bytes, arrays: bytes) -> Model:
+    """The model of both files. Whoever opens the same profile again gets the same model, with what it worked out of its
+    training runs: each of their factors takes as long as reading all of it."""
+    record = _record(content)
+    mechanisms = _mechanisms(record.mechanisms, _unpacked(arrays))
+    graph = CausalGraph(
+        record.nodes,
+        frozenset((e.source, e.target) for e in record.edges if e.kind == "directed"),
+        frozenset((e.source, e.target) for e in record.edges if e.kind == "bidirected"),
+    )
+    _check_references(record)
+    return _to_model(record, graph, mechanisms)
+
+
+def _unpacked(content: bytes) -> Mapping[str, FloatArray]:
     if not content.startswith(ARCHIVE):
         raise ValueError(f"{ARRAYS_FILE} is not an archive of arrays")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
