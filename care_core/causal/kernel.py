@@ -7,6 +7,9 @@ It is the sum of an additive part (each option acts alone) and a joint part (opt
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,6 +60,16 @@ def _alike(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.exp(exponents, out=exponents))
 
 
+def _between(values: FloatArray, place: NDArray[np.intp]) -> Callable[[slice, slice], FloatArray]:
+    """e_j of two slices of n points, which stand at these places among the values: looked up where the values are so
+    few that they have no more pairs than half of the points' own, which are asked for."""
+    if 2 * len(values) > len(place):
+        column = values[place]
+        return lambda these, those: _alike(column[these, None], column[those])
+    pairs = _alike(values[:, None], values)
+    return lambda these, those: pairs[:, place[those]].take(place[these], axis=0)
+
+
 class Kernel(Record, eq=False):
     """The covariance above on scaled inputs. `relevance`: shape (p,); amplitudes, `noise`: standard deviations."""
 
@@ -80,14 +93,19 @@ class Kernel(Record, eq=False):
         """Covariance of n points with each other, shape (n, n): half the work of calling it, and the same numbers."""
         points = _unique(points)
         n = points.place.shape[1]
-        columns = (points.values * self._scale[points.column])[points.place]
+        scaled = points.values * self._scale[points.column]
+        bounds = np.searchsorted(points.column, np.arange(len(points.place) + 1)).tolist()
+        between = [
+            _between(scaled[first:last], place - first)
+            for (first, last), place in zip(pairwise(bounds), points.place, strict=True)
+        ]
         covariance = np.empty((n, n))
         for i in range(0, n, SLICE):
             rows = slice(i, i + SLICE)
             shape = covariance[i:, rows].shape
             joint, each = np.ones(shape), np.full(shape, float(self.idle))
-            for column in columns:
-                e = _alike(column[i:, None], column[rows])
+            for alike in between:
+                e = alike(slice(i, None), rows)
                 each += e
                 joint *= e
             covariance[i:, rows] = self._sum(joint, each)

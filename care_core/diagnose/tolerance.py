@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from statistics import NormalDist
 
 import numpy as np
@@ -56,6 +57,7 @@ def upper_quantile(values: Sequence[float], known_spread: float | None = None) -
     return Quantile(centre + low * spread, centre + high * spread, method)
 
 
+@cache
 def factor(count: int, degrees: int | None, confidence: float) -> float:
     """k, so that mean + k spread lies above the 95 % quantile with this probability.
 

@@ -13,6 +13,8 @@ from care_core.metadata.words import word_of
 from care_core.records import Record
 
 _TABLE = Path(__file__).with_name("ardupilot.tsv")
+_BEGINNING = 2
+"""Letters that every pattern of the table begins with before it branches."""
 _DEFAULTS = Path(__file__).with_name("ardupilot_defaults.tsv")
 SOURCE = "ArduPilot's parameter list"
 VEHICLES: Mapping[str, str] = {
@@ -117,25 +119,30 @@ def _fact(name: str, row: _Row, releases: Iterable[Release]) -> Fact:
 @cache
 def _rows() -> Mapping[str, list[_Row]]:
     found: dict[str, list[_Row]] = {}
-    for pattern, line in _lines():
-        row = _row(line)
-        for name in expanded(pattern):
-            found.setdefault(name, []).append(row)
+    for lines in _lines().values():
+        for pattern, line in lines:
+            row = _row(line)
+            for name in expanded(pattern):
+                found.setdefault(name, []).append(row)
     return found
 
 
 @cache
 def _rows_of(name: str) -> tuple[_Row, ...]:
     """The rows of one parameter: whoever asks of a few need not read them all."""
-    like = ((pattern, line) for pattern, line in _lines() if name.startswith(pattern.partition("{")[0]))
+    lines = _lines().get(name[:_BEGINNING], ())
+    like = ((pattern, line) for pattern, line in lines if name.startswith(pattern.partition("{")[0]))
     return tuple(_row(line) for pattern, line in like if name in expanded(pattern))
 
 
 @cache
-def _lines() -> tuple[tuple[str, str], ...]:
-    """The lines of the table with their patterns."""
-    lines = [line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#")][1:]
-    return tuple((line.partition("\t")[0], line) for line in lines)
+def _lines() -> Mapping[str, list[tuple[str, str]]]:
+    """The lines of the table with their patterns, by the letters that every name of a pattern begins with."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for line in [line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#")][1:]:
+        pattern, _, _ = line.partition("\t")
+        found.setdefault(pattern[:_BEGINNING], []).append((pattern, line))
+    return found
 
 
 def _row(line: str) -> _Row:
