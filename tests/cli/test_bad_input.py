@@ -21,6 +21,8 @@ from tests.conftest import Care
 ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
 GOOD = ROOT / "tests" / "data" / "arducopter_good.BIN"
+DRIVE = ROOT / "samples" / "owlat_failed.bag"
+"""The quickest to triage."""
 
 
 @pytest.fixture
@@ -137,7 +139,7 @@ def test_names_of_files_do_not_steer_the_terminal(care: Care, tmp_path: Path) ->
     for name in ("e\x1b[31m[red]x\x07\n.BIN", os.fsdecode(b"n\xff\xfe.BIN")):
         path = tmp_path / name
         try:
-            shutil.copy(GOOD, path)
+            shutil.copy(DRIVE, path)
         except OSError:
             pytest.skip("the file system refuses such names")
         for command in (("triage",), ("triage", "--json"), ("triage", "--markdown"), ("inspect",)):
@@ -151,7 +153,7 @@ def test_names_of_files_do_not_steer_the_terminal(care: Care, tmp_path: Path) ->
 @pytest.mark.parametrize("closed", ["stdout", "stderr"])
 def test_a_closed_stream_is_no_error(closed: str) -> None:
     redirect = {"stdout": ">&-", "stderr": "2>&- >/dev/null"}[closed]
-    command = f'"{sys.executable}" -c "from care_tui.cli import main; main()" inspect "{SAMPLE}" {redirect}'
+    command = f'"{sys.executable}" -c "from care_tui.cli import main; main()" inspect "{DRIVE}" {redirect}'
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(["sh", "-c", command], stderr=subprocess.PIPE, timeout=60, env=environment, check=False)
     assert (done.returncode, done.stderr) == (0, b"")

@@ -13,6 +13,7 @@ import pytest
 
 from care_core.application import checkup
 from care_core.files import bundled
+from care_core.profile import store
 from care_core.records import read
 from care_core.report.checkup import DoctorDocument, doctor_schema, doctor_text
 from tests.conftest import Care
@@ -24,6 +25,14 @@ def statuses(text: str) -> dict[str, str]:
     return {check["name"]: check["status"] for check in json.loads(text)["checks"]}
 
 
+@pytest.fixture
+def _few_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that is bundled and the user's own: that all agree with themselves is for the tests of profiles."""
+    every = store.available_profiles
+    monkeypatch.setattr(store, "available_profiles", lambda: [one for one in every() if one.name in ("owlat", "mine")])
+
+
+@pytest.mark.usefixtures("_few_profiles")
 def test_where_all_is_well_the_doctor_says_so(care: Care) -> None:
     outcome = care("doctor", "--json")
     assert outcome.code == 0
@@ -36,10 +45,11 @@ def test_where_all_is_well_the_doctor_says_so(care: Care) -> None:
     assert "works here" in text
 
 
+@pytest.mark.usefixtures("_few_profiles")
 def test_what_is_broken_is_said_with_what_to_do(care: Care, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    store = tmp_path / "history.sqlite3"
-    store.write_bytes(b"no database at all, but long enough to be read" * 30)
-    monkeypatch.setenv("CARE_HISTORY", str(store))
+    history = tmp_path / "history.sqlite3"
+    history.write_bytes(b"no database at all, but long enough to be read" * 30)
+    monkeypatch.setenv("CARE_HISTORY", str(history))
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
     unsound = Path(os.environ["XDG_DATA_HOME"]) / "care" / "profiles" / "mine"

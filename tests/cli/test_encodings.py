@@ -15,7 +15,7 @@ from care_core.errors import ExitCode
 from care_core.files import bundled
 from care_tui.console import encodable
 
-SAMPLE = bundled("samples", "arducopter_failed.BIN")
+SAMPLE = bundled("samples", "owlat_failed.bag")
 ROOT = Path(__file__).parents[2]
 ENCODINGS = ("ascii:strict", "cp1252")
 

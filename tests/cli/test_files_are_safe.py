@@ -20,7 +20,7 @@ from tests.conftest import Care
 
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
 DATA = Path(__file__).parents[1] / "data"
-GOOD = DATA / "arducopter_good.BIN"
+GOOD = DATA / "move_base_good.bag"
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from care_core.profile.store import load_profile
 from tests.conftest import Care
 from tests.courier import SPEED, USUAL, configured, deliver
 
-RUNS = 36
+RUNS = 28
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_few_good_logs_say_what_is_missing(care: Care, logs: Path, tmp_path: Pat
 
 def test_runs_that_lack_something_are_named(care: Care, logs: Path, tmp_path: Path) -> None:
     robot, table = tmp_path / "courier", tmp_path / "runs.csv"
-    care("profiles", "new", logs, "-o", robot)
+    care("profiles", "new", *sorted(logs.glob("*.mcap"))[-4:], "-o", robot)
     header, *rows = (robot / "runs.csv").read_text().splitlines()
     columns = header.split(",")
     place = columns.index("rate")

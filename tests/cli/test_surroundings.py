@@ -16,7 +16,7 @@ from care_core.report.document import build_document
 from care_core.report.writers import published
 from tests.made import made_diagnosis
 
-SAMPLE = bundled("samples", "arducopter_failed.BIN")
+SAMPLE = bundled("samples", "owlat_failed.bag")
 ROOT = Path(__file__).parents[2]
 
 

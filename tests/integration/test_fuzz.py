@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.tools import fuzzing
 
-SECONDS = 0.3
+SECONDS = 0.15
 
 
 @pytest.mark.parametrize("name", fuzzing.TARGETS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,15 @@ ROVER = bundled("samples", "ardurover_failed.BIN")
 
 
 def judged(path: Path, profile: str = "arducopter") -> Judged:
+    return judged_sample(path, profile) if path in (GOOD, SLOW, ROVER) else judged_anew(path, profile)
+
+
+def judged_anew(path: Path, profile: str) -> Judged:
     return read_and_judge(run_model(open_log(path)), load_profile(profile))
+
+
+judged_sample = cache(judged_anew)
+"""The logs that stay as they are while the tests make others of them."""
 
 
 def results(path: Path, profile: str = "arducopter") -> dict[str, ObjectiveResult]:

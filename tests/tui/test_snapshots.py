@@ -22,6 +22,12 @@ SIZES = {"60x20": (60, 20), "80x24": (80, 24), "120x40": (120, 40), "170x45": (1
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
 SnapCompare = Callable[..., bool]
 
+EVERY_SIZE = pytest.mark.parametrize(
+    "size",
+    [pytest.param(size, marks=pytest.mark.long if name == "170x45" else (), id=name) for name, size in SIZES.items()],
+)
+"""The widest is for `make long`."""
+
 pytestmark = pytest.mark.skipif(sys.version_info[:2] != (3, 11), reason="snapshots are made on Python 3.11 only")
 
 
@@ -32,7 +38,7 @@ def press(*keys: str) -> Callable[[Pilot[Any]], Awaitable[None]]:
     return walk
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+@EVERY_SIZE
 @pytest.mark.parametrize(
     "keys",
     [("1",), ("2",), ("3",), ("4", "j"), ("5",), ("6",)],
@@ -48,7 +54,7 @@ def test_other_verdicts(snap_compare: SnapCompare, make_app: MakeApp, kind: str)
     assert snap_compare(make_app(diagnosis), terminal_size=(80, 24), run_before=press())
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+@EVERY_SIZE
 @pytest.mark.parametrize(("kind", "step"), [("crashed", "1"), ("crashed", "3"), ("unfitting", "1")])
 def test_what_happened(
     snap_compare: SnapCompare, make_app: MakeApp, kind: str, step: str, size: tuple[int, int]

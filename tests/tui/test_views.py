@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from care_core.errors import UsageError
 from care_core.files import bundled
 from care_core.records import replace
 from care_tui.app import CareApp
+from care_tui.engine import Engine, open_and_warm
 from care_tui.pages.history import HistoryPage
 from care_tui.places import remember
 from care_tui.render.plot import dots_across, plot
@@ -30,8 +32,18 @@ SAMPLE = bundled("samples", "arducopter_failed.BIN")
 needs_sample = pytest.mark.skipif(not SAMPLE.is_file(), reason="the sample is not bundled")
 
 
+REQUEST = Request(SAMPLE, top=10)
+
+
+@cache
+def opened() -> Case:
+    """The sample as the app opens it, once for all: what each test looks at are the views of it."""
+    return open_and_warm(REQUEST, lambda _step, _share: None)
+
+
 def real(configs: tuple[str | Path, ...] = ()) -> CareApp:
-    return CareApp(Request(SAMPLE, configs=configs, top=10), settings=Settings(places=()))
+    engine = Engine() if configs else Engine(lambda _request, _progress: opened())
+    return CareApp(replace(REQUEST, configs=configs), engine=engine, settings=Settings(places=()))
 
 
 @needs_sample

@@ -18,6 +18,7 @@ from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
 from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made, flight_of
+from tests.whole import examples
 
 JUMP = Damage("the clock jumps", 0, 40.0, is_jump=True)
 
@@ -712,7 +713,7 @@ def test_spans_of_a_mask() -> None:
     assert runs(t, t < 0) == []
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     drop=st.lists(st.sampled_from(sorted(Made(0.5).tables())), max_size=12),
     keep_rows=st.integers(0, 6),

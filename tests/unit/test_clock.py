@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from care_core.logs.clock import OwnClock, clock_of, find_clock
+from tests.whole import examples
 
 
 def places(n: int) -> NDArray[np.int64]:
@@ -92,7 +93,7 @@ def test_any_stamps_give_a_clock(stamps: list[float]) -> None:
     assert clock.duration_s >= 0
 
 
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=examples(50))
 @given(st.lists(st.sampled_from([0.0, 0.1, 1.0, 7.0, -2.0, -90.0, 1e6, 1e13, np.nan]), max_size=80), st.integers(1, 9))
 def test_a_clock_found_piece_by_piece_is_the_same(steps: list[float], size: int) -> None:
     stamps = 50.0 + np.cumsum(np.nan_to_num(steps))

@@ -16,6 +16,7 @@ from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
 from care_core.variables import Role
 from tests.simulated import schema_of
+from tests.whole import examples
 
 O, M, Y = Role.OPTION, Role.METRIC, Role.OBJECTIVE  # noqa: E741
 
@@ -121,7 +122,7 @@ def test_constraints_and_acyclicity_are_respected() -> None:
     assert len(found.graph.topological_order()) == len(schema.variables)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=examples(30))
 @given(st.integers(0, 10**6))
 def test_the_graph_only_grows(seed: int) -> None:
     rng = np.random.default_rng(seed)

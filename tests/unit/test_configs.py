@@ -21,6 +21,7 @@ from care_core.records import replace
 from care_core.run import Setting
 from care_core.variables import Change, Role, Variable
 from tests.made import DRIVEN, LAND_SPEED, made_diagnosis
+from tests.whole import examples
 
 
 def written(tmp_path: Path, name: str, text: str) -> Path:
@@ -300,7 +301,7 @@ def test_written_rows_read_back_with_their_types(
     assert [type(read[name]) for name in given] == [type(value) for value in given.values()]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 @given(given=st.dictionaries(st.lists(WORD, min_size=1, max_size=4).map(tuple), ROS_VALUE, max_size=6))
 def test_written_ros_parameters_read_back_with_their_types(
     tmp_path_factory: pytest.TempPathFactory, given: dict[tuple[str, ...], float | str]

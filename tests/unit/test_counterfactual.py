@@ -16,6 +16,7 @@ from care_core.records import replace
 from care_core.run import Unavailable
 from care_core.variables import Threshold
 from tests.planted import CALM, DEFAULTS, OPTIONS, SCHEMA, fly_many, planted_run, query_of
+from tests.whole import examples
 
 BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
 CONFIGS = st.fixed_dictionaries(
@@ -24,7 +25,8 @@ CONFIGS = st.fixed_dictionaries(
         for o in OPTIONS
     }
 )
-QUICK = settings(deadline=None, max_examples=30)
+
+QUICK = settings(deadline=None, max_examples=examples(30))
 
 
 def query(

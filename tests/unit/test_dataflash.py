@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from care_core.errors import LogError
 from care_core.logs.dataflash import DataFlashLog
+from tests.whole import examples
 
 HEAD = b"\xa3\x95"
 
@@ -157,7 +158,7 @@ def test_a_file_cut_while_open_is_read_to_its_end(tmp_path: Path) -> None:
     assert len(log.read({"TST": ("I",)})["TST"]) == 3
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.data())
 def test_damage_never_raises_anything_but_log_error(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

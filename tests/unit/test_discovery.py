@@ -17,6 +17,7 @@ from care_core.learn.discovery import FisherZ, Mark, Pag, discover
 from care_core.learn.structure import learn_structure
 from care_core.variables import Role
 from tests.simulated import simulate
+from tests.whole import examples
 
 METRICS = tuple("abcdef")
 FREE = Constraints(dict.fromkeys(METRICS, Role.METRIC))
@@ -60,7 +61,7 @@ def assert_sound(pag: Pag, truth: CausalGraph) -> None:
             assert b in truth.ancestors(a), f"{a} *-- {b}"
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(mixed_graphs())
 def test_with_an_oracle_adjacencies_are_exact_and_marks_sound(truth: CausalGraph) -> None:
     pag = discover(METRICS, Oracle(truth, METRICS), FREE, max_given=4, max_given_beyond=4)
@@ -73,7 +74,7 @@ def test_with_an_oracle_adjacencies_are_exact_and_marks_sound(truth: CausalGraph
     assert_sound(pag, truth)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=examples(40))
 @given(st.data())
 def test_constraints_keep_the_marks_sound(data: st.DataObject) -> None:
     roles = {"o1": O, "o2": O, "c": C, "m1": M, "m2": M, "m3": M, "y": Y}
@@ -128,7 +129,7 @@ def test_the_partial_graph_of_known_graphs(directed: str, hidden: str, pag: set[
     assert found == pag
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=examples(25))
 @given(mixed_graphs(nodes=METRICS[:5]))
 def test_with_hidden_causes_agrees_with_causal_learn_on_its_own_oracle(truth: CausalGraph) -> None:
     """Same adjacencies; a mark is the same, or a circle of ours where causal-learn's R5 to R10 say more."""

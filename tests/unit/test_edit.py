@@ -16,6 +16,7 @@ from care_core.errors import ConfigError
 from care_core.run import Setting
 from care_core.variables import Role, Variable
 from tests.conftest import Care
+from tests.whole import examples
 
 SPEED = Variable("speed", Role.OPTION, parameters=("/move_base/DWA/max_vel",))
 COUNT = Variable("count", Role.OPTION, "int", reboot_required=True, parameters=("/move_base/DWA/count",))
@@ -129,7 +130,7 @@ def test_ros_2_files_are_edited_by_node(tmp_path: Path) -> None:
 NAMES = st.lists(st.from_regex(r"[A-Z]{3,6}_[A-Z]{2,4}", fullmatch=True), min_size=1, max_size=8, unique=True)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(40), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(names=NAMES, old=st.floats(-1e4, 1e4, width=32), new=st.floats(-1e4, 1e4, width=32), data=st.data())
 def test_applying_then_comparing_gives_the_change(
     tmp_path: Path, names: list[str], old: float, new: float, data: st.DataObject

@@ -25,9 +25,10 @@ from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.variables import Role, Variable
 from tests.planted import DEFAULTS, OPTIONS, planted_query, planted_run, query_of
+from tests.whole import examples
 
 BY_NAME = {option.name: option for option in OPTIONS}
-QUICK = settings(deadline=None, max_examples=40)
+QUICK = settings(deadline=None, max_examples=examples(40))
 
 
 def candidates(planted: Profile, option: Variable, current: float, reference: float) -> tuple[float, ...]:

@@ -78,7 +78,7 @@ def _add(path: Path, start: int) -> None:
 
 
 def test_processes_that_write_at_once_lose_nothing(history: History) -> None:
-    with ProcessPoolExecutor(4, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         list(pool.map(_add, [history.path] * 4, (0, 100, 200, 300)))
     assert len(history.triages()) == 20
 

@@ -205,10 +205,11 @@ SHARED = os.environ.get("CARE_SHARED")
 needs_logs = pytest.mark.skipif(SHARED is None, reason="CARE_SHARED names no folder of recorded logs")
 WILD = ("ardusub_small", "copter35_mixed_v1_v2", "copter47_sitl", "copter_real_radio_23min", "quadplane_vtol",
         "crawler_generic_autopilot", "one_packet_70bytes", "ardusub_pymavlink_bug")  # fmt: skip
+LARGE = {"copter_real_radio_23min", "ardusub_pymavlink_bug"}
 
 
 @needs_logs
-@pytest.mark.parametrize("name", WILD)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long if name in LARGE else ()) for name in WILD])
 def test_agrees_with_pymavlink_message_by_message(name: str) -> None:
     mavutil = pytest.importorskip("pymavlink.mavutil")
     path = Path(SHARED or "", "logs", "mavlink_tlog", f"{name}.tlog")

@@ -26,6 +26,7 @@ from nav2_robot.robot import RADIUS, STEP_S, Robot
 from nav2_robot.servers import installed
 from nav2_robot.standin import StandIn, plan
 from nav2_robot.world import CELL_M, Conditions, Passage, World
+from tests.whole import examples
 
 START = Path(__file__).parents[2] / "samples" / "nav2_robot" / "start" / "dwb.yaml"
 ROOM = World(
@@ -61,7 +62,7 @@ def test_beyond_the_longest_range_there_is_no_return_and_nothing_is_nearer_than_
     assert laser.limited(np.array([0.001, 5.0, 40.0])).tolist() == [laser.RANGE_MIN, 5.0, math.inf]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(st.floats(-0.9, 5.9), st.floats(-1.9, 1.9))
 def test_a_body_touches_a_wall_that_is_nearer_than_its_radius(x: float, y: float) -> None:
     nearest = min(x + 1.0, 6.0 - x, y + 2.0, 2.0 - y)

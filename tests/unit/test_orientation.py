@@ -20,6 +20,7 @@ from care_core.learn.orientation import (
     resolve,
 )
 from care_core.variables import Role
+from tests.whole import examples
 
 NAMES = tuple("abcde")
 FREE = Constraints(dict.fromkeys(NAMES, Role.METRIC))
@@ -41,7 +42,7 @@ def partial_graphs(draw: st.DrawFn) -> Pag:
     return Pag(NAMES, tuple(edges))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=examples(40))
 @given(partial_graphs(), st.integers(0, 100))
 def test_every_edge_is_resolved_without_touching_arrowheads_or_making_a_cycle(pag: Pag, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -19,6 +19,7 @@ from care_core.errors import LogError
 from care_core.logs.opening import open_log
 from care_core.logs.ros1_bag import Ros1Bag
 from care_core.logs.ros_message import parse_definition
+from tests.whole import examples
 
 STORE = get_typestore(Stores.ROS1_NOETIC)
 
@@ -220,7 +221,7 @@ def test_unclosed_bag_is_read_and_reported(sample: Path, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
 @given(share=st.floats(0.0, 0.999))
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(25), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_cut_bag_gives_what_comes_before_the_cut(
     tmp_path_factory: pytest.TempPathFactory, compression: str, share: float
 ) -> None:
@@ -246,7 +247,7 @@ def test_a_cut_bag_gives_what_comes_before_the_cut(
 
 @pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
 @given(where=st.integers(0, 100_000), value=st.integers(0, 255))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_flipped_byte_never_raises_but_our_error(
     tmp_path_factory: pytest.TempPathFactory, compression: str, where: int, value: int
 ) -> None:

@@ -17,6 +17,7 @@ from care_core.constraints import parse_constraint
 from care_core.errors import UsageError
 from care_core.variables import Role, Variable
 from tests.campaigns import space
+from tests.whole import examples
 
 METHODS: tuple[Method, ...] = ("sobol", "latin_hypercube", "uniform")
 TWO = {"a": (0.0, 1.0), "b": (-3.0, 5.0)}
@@ -56,7 +57,7 @@ def spaces(draw: Any) -> Space:
     return Space(made, reference, [parse_constraint(one, reference) for one in limits])
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(spaces(), st.sampled_from((*METHODS, "one_at_a_time")), st.floats(0, 0.9), st.integers(0, 1000))
 def test_no_sample_crosses_a_range_or_a_limit(where: Space, method: Any, at_reference: float, seed: int) -> None:
     try:

@@ -158,7 +158,7 @@ def test_neither_report_nor_bundle_says_any_of_it(planted: Case) -> None:
         texts |= {name: archive.read(name).decode() for name in archive.namelist()}
     for name, text in texts.items():
         for secret in (*PLACES, *DAYS, *ADDRESSES, *SERIALS, *NAMES):
-            assert not re.search(rf"(?<!\w){re.escape(secret)}(?!\w)", text), (name, secret)
+            assert secret not in text or not re.search(rf"(?<!\w){re.escape(secret)}(?!\w)", text), (name, secret)
         assert str(VALUE) not in text, name
         assert not [one for one in PLANTED if one in text], name
 

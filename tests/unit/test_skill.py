@@ -60,7 +60,7 @@ def test_the_planted_robot_is_predicted_on_runs_it_has_not_seen(planted: Profile
 
 
 def test_folds_are_the_same_on_any_number_of_processes(planted: Profile) -> None:
-    frame = fly_many(90)
+    frame = fly_many(60)
     answers = [
         cross_validated_skill(frame, SCHEMA, planted.model.graph, np.random.default_rng(0), folds=2, n_jobs=n_jobs)
         for n_jobs in (1, 2)

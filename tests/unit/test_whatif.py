@@ -20,6 +20,7 @@ from care_core.run import ProfileChoice
 from care_core.variables import Role, Variable
 from tests.conftest import Care
 from tests.planted import CALM, DEFAULTS, SCHEMA, fly, planted_run
+from tests.whole import examples
 
 CHOICE = ProfileChoice("planted", "1", "Simulated robot", "")
 
@@ -38,7 +39,7 @@ def test_a_faster_robot_is_predicted_to_meet_its_time(slow: Question) -> None:
     assert answer.p_ok > answer.p_ok_now
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=examples(30))
 @given(speed=st.floats(1, 10), accel=st.floats(0.5, 4))
 def test_probabilities_are_probabilities_and_an_answer_repeats(slow: Question, speed: float, accel: float) -> None:
     answer = slow.ask({"speed": speed, "accel": accel})

@@ -111,8 +111,11 @@ def _joined(path: Path) -> str:
 
 
 def _defined() -> Iterator[tuple[Path, str]]:
+    """Names that a module defines; one that holds no replaced name at all need not be parsed for that."""
+    replaced = re.compile(rf"\b(?:{'|'.join(map(re.escape, REPLACED_NAMES))})\b")
     for path in _sources():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if replaced.search(text) else ():
             if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
                 yield path, node.name
             elif isinstance(node, ast.arg):
