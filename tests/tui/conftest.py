@@ -158,7 +158,8 @@ def _is_under_way(app: object) -> bool:
     state = app.workspace.session.state
     if app.workspace.request is not None and app.workspace.folder is None and state in ("empty", "loading"):
         return True
-    page = app.screen.page if isinstance(app.screen, CaseScreen) else None
+    screen = app.screen
+    page = screen.page if isinstance(screen, CaseScreen) and not screen.query_one("#too-small").display else None
     return bool(app._batch_count) or (
         page is not None and page.FITS and state in ("error", "data") and not page.reader.plain
     )
