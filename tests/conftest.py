@@ -86,7 +86,7 @@ def recorded() -> Path:
 
 @pytest.fixture(scope="session")
 def planted(shared_folder: Path) -> Profile:
-    """A profile trained on 150 missions of the robot in `planted`, written and read as an installed one is."""
+    """A profile trained on 250 missions of the robot in `planted`, written and read as an installed one is."""
     from care_core.learn.train import train
     from care_core.profile.model import write_model
     from care_core.profile.store import Profile
@@ -98,7 +98,7 @@ def planted(shared_folder: Path) -> Profile:
     with (folder / "lock").open("w") as lock:
         flock(lock, LOCK_EX)
         if not (folder / "mechanisms.npz").is_file():  # what is written last
-            write_model(train(fly_many(150), SCHEMA, SETTINGS), folder)
+            write_model(train(fly_many(250), SCHEMA, SETTINGS), folder)
     return Profile(folder, SCHEMA)
 
 

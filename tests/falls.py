@@ -61,7 +61,8 @@ def fly(
     """A hover with the event and a kick (rad/s^2 about three axes); it lies where it hit the ground."""
     rng = np.random.default_rng(seed)
     mix = np.array([[motor.roll, motor.pitch, motor.yaw] for motor in motors]).T
-    allocate = np.linalg.pinv(mix * _INERTIA[:, None])
+    turning = mix * _INERTIA[:, None]
+    allocate = np.linalg.pinv(turning)
     turned, rates, height, climb = np.eye(3), np.zeros(3), 0.0, 0.0
     rows: list[tuple[float, Floats, Floats, float, float]] = []
     down_s, given = None, np.zeros(len(motors))
@@ -69,15 +70,16 @@ def fly(
         asked = np.zeros(len(motors))
         if t >= ARMED_S and (down_s is None or t < down_s + 1.0):
             wanted = HEIGHT_M if t < END_S - 1 else 0.0
-            lift = np.clip(HOVER + 0.03 * (wanted - height) - 0.06 * climb, 0.1, 0.9)
-            down = turned.T @ np.array([0.0, 0.0, 1.0])
+            lift = min(max(HOVER + 0.03 * (wanted - height) - 0.06 * climb, 0.1), 0.9)
+            down = turned[2]
             torque = np.array([-_KP * down[1], _KP * down[0], 0.0]) * 8 - _KD * 8 * rates
             torque[2] = -_KYAW * 8 * rates[2]
-            asked = np.clip(lift + allocate @ torque + rng.normal(0, 0.004, len(motors)), 0.0, 1.0)
+            wanted_of_each = lift + allocate @ torque + rng.normal(0, 0.004, len(motors))
+            asked = np.minimum(np.maximum(wanted_of_each, 0.0), 1.0)
         given += (asked - given) * min(STEP_S / TURN_S, 1.0)
         gives = event(float(t), given)
         force = gives.mean() / HOVER * _G
-        rates = rates + STEP_S * (mix * _INERTIA[:, None] @ gives + kick(float(t)) - 0.3 * rates)
+        rates = rates + STEP_S * (turning @ gives + kick(float(t)) - 0.3 * rates)
         speed, felt = climb, force
         climb += STEP_S * (turned[2, 2] * force - _G)
         height += STEP_S * climb

@@ -59,6 +59,7 @@ def test_the_planted_robot_is_predicted_on_runs_it_has_not_seen(planted: Profile
         assert found.calibration_error < 0.1, name
 
 
+@pytest.mark.long
 def test_folds_are_the_same_on_any_number_of_processes(planted: Profile) -> None:
     frame = fly_many(60)
     answers = [

@@ -292,7 +292,7 @@ def test_the_windows_of_the_walk_change_nothing(tmp_path: Path, monkeypatch: pyt
 
 @pytest.mark.parametrize("what", ["zeros", "noise", "texts", "headers", "subscriptions"])
 def test_no_file_is_looked_through_for_ever(what: str, tmp_path: Path) -> None:
-    rng, size = np.random.default_rng(0), 250_000
+    rng, size = np.random.default_rng(0), 1_000_000
     raw = {
         "zeros": bytes(size),
         "noise": rng.integers(0, 256, size, np.uint8).tobytes(),
@@ -306,4 +306,4 @@ def test_no_file_is_looked_through_for_ever(what: str, tmp_path: Path) -> None:
     path.write_bytes(head("alpha:uint64_t timestamp;") + subscription(1, "alpha") + message(1, START_US) + raw)
     began = time.process_time()
     Px4Log(path).settings()
-    assert time.process_time() - began < 2.5
+    assert time.process_time() - began < 10.0
