@@ -28,8 +28,9 @@ def statuses(text: str) -> dict[str, str]:
 @pytest.fixture
 def _few_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that is bundled and the user's own: that all agree with themselves is for the tests of profiles."""
-    every = store.available_profiles
-    monkeypatch.setattr(store, "available_profiles", lambda: [one for one in every() if one.name in ("owlat", "mine")])
+    every = store.profile_folders
+    few = ("owlat", "mine")
+    monkeypatch.setattr(store, "profile_folders", lambda: {name: at for name, at in every().items() if name in few})
 
 
 @pytest.mark.usefixtures("_few_profiles")

@@ -32,6 +32,7 @@ def campaign(tmp_path: Path, care: Care, monkeypatch: pytest.MonkeyPatch) -> Cam
     return read_campaign(tmp_path / "arm" / "campaign.yaml")
 
 
+@pytest.mark.long
 def test_a_fault_is_diagnosed_repaired_run_again_and_verified(
     campaign: Campaign, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

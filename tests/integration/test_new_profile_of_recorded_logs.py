@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import Care
+from tests.whole import one_in
 
 LOGS = {
     "bag": ("data/move_base/faults/g55_002.bag", "actionlib_goals"),
@@ -19,7 +20,7 @@ LOGS = {
 }
 
 
-@pytest.mark.parametrize("kind", LOGS)
+@pytest.mark.parametrize("kind", one_in(2, LOGS))
 def test_any_recorded_log_makes_a_profile(care: Care, recorded: Path, tmp_path: Path, kind: str) -> None:
     name, mission = LOGS[kind]
     made = care("profiles", "new", recorded / name, "-o", tmp_path / "robot")

@@ -344,7 +344,7 @@ def test_the_same_seed_gives_the_same_files_and_the_same_diagnosis(tmp_path: Pat
     first, again = tmp_path / "first", tmp_path / "again"
     for folder in (first, again):
         folder.mkdir()
-        write_model(train(fly_many(80), SCHEMA, SETTINGS), folder)
+        write_model(train(fly_many(60), SCHEMA, SETTINGS), folder)
     for name in ("model.json", "mechanisms.npz"):
         assert (first / name).read_bytes() == (again / name).read_bytes()
     run = planted_run(speed=1.4, planner=2)

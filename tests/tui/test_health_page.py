@@ -231,7 +231,9 @@ async def test_an_objective_is_judged_by_another_threshold() -> None:
         assert "met or not" in app.title
 
 
-@pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60)])
+@pytest.mark.parametrize(
+    "size", [(60, 20), (80, 24), *(pytest.param(size, marks=pytest.mark.long) for size in ((120, 40), (200, 60)))]
+)
 @pytest.mark.parametrize("diagnosis", [sample.crashed(), sample.unfitting()], ids=["crashed", "unfitting"])
 async def test_no_pane_is_wider_than_its_terminal(
     make_app: MakeApp, size: tuple[int, int], diagnosis: Diagnosis

@@ -573,7 +573,9 @@ async def test_text_of_the_log_is_neither_markup_nor_escape_sequence(make_app: M
         assert "\u202e" not in screen
 
 
-@pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60)])
+@pytest.mark.parametrize(
+    "size", [(60, 20), (80, 24), *(pytest.param(size, marks=pytest.mark.long) for size in ((120, 40), (200, 60)))]
+)
 async def test_no_page_is_wider_than_its_terminal(make_app: MakeApp, size: tuple[int, int]) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=size) as pilot:

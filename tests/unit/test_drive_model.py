@@ -17,7 +17,7 @@ from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.goals import Status, actionlib_goals
 from care_core.ecosystems.ros.messages import ACTION_GOAL, ACTION_RESULT, MESSAGES, SCAN
 from care_core.ecosystems.ros.node_messages import Level, level_of, level_word
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Log, Table, Wanted
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from care_core.records import replace
@@ -30,10 +30,14 @@ FAULTS = ("laser dead", "laser stuck", "laser noise", "jump", "drift", "weak", "
           "blocked")  # fmt: skip
 
 
-def drive_of(path: Path) -> Drive:
-    model = run_model(open_log(path))
+def drive_in(log: Log) -> Drive:
+    model = run_model(log)
     assert isinstance(model, Drive)
     return model
+
+
+def drive_of(path: Path) -> Drive:
+    return drive_in(open_log(path))
 
 
 @pytest.fixture
@@ -80,11 +84,11 @@ def test_health_sees_the_same_samples_whoever_else_reads(monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_check_reads_what_it_says_that_it_reads(fault: str, tmp_path: Path) -> None:
-    path = Driven(fault, ABORTED).write(tmp_path / "drive.mcap")
-    whole = drive_of(path)
+    log = open_log(Driven(fault, ABORTED).write(tmp_path / "drive.mcap"))
+    whole = drive_in(log)
     ECOSYSTEM.examine(whole)
     for check in CHECKS:
-        alone = drive_of(path)
+        alone = drive_in(log)
         alone.look_at(check.reads)
         assert list(check.find(alone)) == list(check.find(whole)), check.name
 
