@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 
 from care_core.application import checkup
-from care_core.files import bundled
+from care_core.files import bundled, profile_folders
 from care_core.profile import store
 from care_core.records import read
 from care_core.report.checkup import DoctorDocument, doctor_schema, doctor_text
@@ -28,9 +28,11 @@ def statuses(text: str) -> dict[str, str]:
 @pytest.fixture
 def _few_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that is bundled and the user's own: that all agree with themselves is for the tests of profiles."""
-    every = store.profile_folders
-    few = ("owlat", "mine")
-    monkeypatch.setattr(store, "profile_folders", lambda: {name: at for name, at in every().items() if name in few})
+
+    def few() -> dict[str, Path]:
+        return {name: folder for name, folder in profile_folders().items() if name in ("owlat", "mine")}
+
+    monkeypatch.setattr(store, "profile_folders", few)
 
 
 @pytest.mark.usefixtures("_few_profiles")

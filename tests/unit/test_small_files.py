@@ -39,8 +39,9 @@ def pipe(path: Path) -> None:
 
 
 def listening(path: Path) -> None:
-    os.chdir(path.parent)  # the name of a socket may have 107 characters
-    socket.socket(socket.AF_UNIX).bind(path.name)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(path.parent)  # the name of a socket may have 107 characters
+        socket.socket(socket.AF_UNIX).bind(path.name)
 
 
 def sparse(path: Path) -> None:
