@@ -108,6 +108,7 @@ def test_a_folder_that_cannot_be_graded_is_refused(faults: Path, tmp_path: Path)
         read_faults(faults, SCHEMA)
 
 
+@pytest.mark.long
 def test_the_published_predictions_score_as_published(recorded: Path) -> None:
     profile = load_profile("husky-care")
     evaluation = evaluate(profile.schema, profile.model, read_faults(recorded / "data" / "care", profile.schema))

@@ -211,6 +211,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.long
 def test_every_recorded_refusal_names_the_option_that_set_its_check_off(recorded: Path) -> None:
     profile = load_profile("arducopter")
     seen: list[str] = []
