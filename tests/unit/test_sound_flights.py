@@ -217,3 +217,14 @@ def test_a_crash_that_the_firmware_finds_before_any_throttle_was_steered_by_nobo
     made.rows["ERR"] = [(60.0, {"Subsys": 12.0, "ECode": 1.0})]
     said = [one.title for one in every_finding(made.find()) if one.kind == "crash"]
     assert (UNDRIVEN in said) == is_undriven
+
+
+def test_records_that_the_receivers_own_clock_puts_before_others_are_no_jumps() -> None:
+    made = Made()
+    gps = made.table["GPS"]
+    gps["GMS"] = 1e8 + 1e3 * made.t
+    mixed = made.after(50.0, 50.25)
+    gps["Lat"][mixed] += 60.0 / 111319.5
+    assert [title for title in titles(made) if "jumps" in title], "in order, they are"
+    gps["GMS"][mixed] -= 5e3
+    assert not [title for title in titles(made) if "jumps" in title]

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Span, during
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.coverage import inside
@@ -47,7 +47,7 @@ _LONG_S = LIMITS.add("critical loss of the fix", 5.0, "s", "a choice: the estima
 _RATIO = LIMITS.add("test ratio of the estimator", 1.0, "", "AP_NavEKF3: above it the position is rejected")
 _HACC_M = LIMITS.add("accuracy of the position", 10.0, "m", "twice what the firmware's checks want")
 _SACC_MS = LIMITS.add("accuracy of the speed", 3.0, "m/s", "three times what the firmware's checks want")
-_METRES = 111319.5
+_METRES, _DAY_MS = 111319.5, 86_400_000.0
 _FIX = 3
 _ERR_GPS, _ERR_GPS_LOST, _GLITCH = 11, 7, 2
 _JUMP = calibrated(
@@ -92,6 +92,8 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     if not {"Lat", "Lng", "Spd", "GCrs"} <= table.columns.keys():
         return
     fixed = table.where((table["Status"] >= _FIX) & (np.abs(table["Lat"]) > 1e-6))
+    late_at = fixed.t[_is_late(fixed)]
+    fixed = fixed.where(~_is_late(fixed))
     if len(fixed) < 3:
         return
     new = np.append(True, (np.diff(fixed["Lat"]) != 0) | (np.diff(fixed["Lng"]) != 0) | (np.diff(fixed.t) > 1.0))
@@ -103,6 +105,7 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     limit = JUMP_M + 0.25 * ACCELERATION * np.minimum(dt, 1.5) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
     limit = np.maximum(limit, _TIMES_USUAL * quantile(off, 0.9))  # a velocity that never fits tells nothing
     late = t[1:] < t[0] + _STEP_S if flight.is_telemetry else np.zeros(len(off), dtype=bool)  # what waited for the link
+    late |= np.diff(np.searchsorted(late_at, t)) > 0  # whose record the next one is, nobody knows
     beyond = np.flatnonzero((off > limit) & (dt < _STEP_S) & (dt > 0.01) & ~late)
     if not len(beyond):
         return
@@ -122,6 +125,15 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
         source="GPS.Lat, Lng against Spd and GCrs; GPSGLITCH_RADIUS 5 m, GPSGLITCH_ACCEL 10 m/s^2 of ArduPilot",
         probability=calibrated_probability(over, _JUMP),
     )
+
+
+def _is_late(table: Table) -> Mask:
+    """Records that the receiver's own clock puts before earlier ones: two programs that write one file, or a second
+    vehicle under the same name, mix them in. A new week begins once."""
+    if "GMS" not in table.columns or not len(table):
+        return np.zeros(len(table), dtype=bool)
+    behind = np.maximum.accumulate(table["GMS"]) - table["GMS"]
+    return np.asarray((behind > 0) & (behind < _DAY_MS))
 
 
 def _unexplained(table: Table) -> tuple[Floats, Floats]:
