@@ -228,3 +228,21 @@ def test_records_that_the_receivers_own_clock_puts_before_others_are_no_jumps() 
     assert [title for title in titles(made) if "jumps" in title], "in order, they are"
     gps["GMS"][mixed] -= 5e3
     assert not [title for title in titles(made) if "jumps" in title]
+
+
+@pytest.mark.parametrize(("falls", "is_caught"), [(False, True), (True, False)])
+def test_what_turns_over_and_does_not_fall_lies_on_what_it_hit(falls: bool, is_caught: bool) -> None:
+    made = Made()
+    lost = made.after(50.0)
+    grow = np.clip((made.t - 50.0) / 0.5, 0.0, 1.0)[lost]
+    made.table["ATT"]["Roll"][lost], made.table["ATT"]["Pitch"][lost] = -85.0 * grow, 40.0 * grow
+    made.table["RCOU"]["C2"][made.after(50.0, 52.0)] = 1950.0
+    made.table["RCOU"]["C1"][made.after(50.0, 52.0)] = 1100.0
+    if falls:
+        for name, field in HEIGHTS:
+            made.table[name][field][lost] = np.clip(12.0 - 5.0 * (made.t[lost] - 50.0) ** 2, 0.0, None)
+    made.rows["ERR"] = [(54.0, {"Subsys": 12.0, "ECode": 1.0})]
+    made.rows["ARM"][1] = (54.0, {"ArmState": 0.0, "Forced": 0.0})
+    said = titles(made)
+    assert ("it hit something" in said) == is_caught
+    assert ("motor 2 (rear left) gave no thrust" in said) == falls

@@ -77,6 +77,8 @@ _SPINS_DEG_S, _HALF_TURN_DEG = 400.0, 180.0
 """A copter that turns so fast about its level axes, and so far, in a mode that keeps it level has turned over."""
 _TAXIES_MS = 8.0
 """Faster over ground, a plane flies or is about to; against a gale its height tells."""
+_CAUGHT_S, _CAUGHT_M = 2.0, 1.0
+"""What leans so far that its motors lift nothing falls by 20 m in this time, and was caught if by less than this."""
 _TUMBLING_DEG, _TUMBLES_S = 45.0, 2.0
 _ROLLS = frozenset((UNKNOWN_MODE, 0, 3, 4, 23))
 """Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; any where the log does not say."""
@@ -431,8 +433,15 @@ class Airborne(Armed):
 
     @cached_property
     def struck_s(self) -> float | None:
-        """When it hit something before control was lost: by a blow just before, or one that stopped it or that nothing
-        in flight comes near; None where no blow did."""
+        """When it hit something before control was lost: by a blow, or as it was caught; None where it did not."""
+        if self.blow_s is not None or self.lost_control_s is None or not self.is_caught:
+            return self.blow_s
+        return self._last_followed_s(self.lost_control_s)
+
+    @cached_property
+    def blow_s(self) -> float | None:
+        """When a blow came just before control was lost, or one that stopped it or that nothing in flight comes near;
+        None where no blow did."""
         lost = self.lost_control_s
         if lost is None:
             return None
@@ -442,6 +451,26 @@ class Airborne(Armed):
         moved = self.one("GPS", "Spd")
         hard = (t for t, felt in flown if felt > _HARD * _SHOCK or _stops_at(moved, t))
         return min((*hard, *just_before), default=None)
+
+    def _last_followed_s(self, until: float) -> float:
+        """When it last followed its attitude demand before a time."""
+        if self.lean_error is None:
+            return until
+        t, error = self.lean_error
+        followed = t[(t < until) & (error < FOLLOWED_DEG)]
+        return float(followed[-1]) if len(followed) else until
+
+    @cached_property
+    def is_caught(self) -> bool:
+        """Whether a copter that turned over stays where it was, its motors lifting nothing: it lies on what it hit."""
+        lost, known, leans = self.lost_control_s, self.height, self.tilt
+        if lost is None or known is None or leans is None or not self.is_copter:
+            return False
+        heights = known[1][(known[0] >= lost) & (known[0] <= lost + _CAUGHT_S)]
+        lies = leans[1][(leans[0] >= lost + _CAUGHT_S / 2) & (leans[0] <= lost + _CAUGHT_S)]
+        if len(heights) < 3 or len(lies) < 3:
+            return False
+        return bool(np.min(lies) > _OVER_DEG and np.min(heights) > _GROUND_M and np.ptp(heights) < _CAUGHT_M)
 
     def _blows(self) -> Iterator[tuple[float, float]]:
         """Each time that it was shaken beyond what flight does, and by how much, m/s^2; 0 where all that is

@@ -65,7 +65,8 @@ def find(flight: Flight) -> Iterator[Finding]:
             "" if flight.hit is None else flight.hit.said,
             steered,
             "no throttle was given since it was armed: does it estimate its attitude rightly?" if undriven else "",
-            "a blow came before control was lost" if flight.struck_s is not None else "",
+            "a blow came before control was lost" if flight.blow_s is not None else "",
+            "it turned over and did not fall: it lies on what it hit" if flight.is_caught else "",
         )
         yield Finding(
             kind="crash",
