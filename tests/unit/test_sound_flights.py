@@ -246,3 +246,18 @@ def test_what_turns_over_and_does_not_fall_lies_on_what_it_hit(falls: bool, is_c
     said = titles(made)
     assert ("it hit something" in said) == is_caught
     assert ("motor 2 (rear left) gave no thrust" in said) == falls
+
+
+@pytest.mark.parametrize(("swung", "is_named"), [(0.0, True), (25.0, False)])
+def test_what_leaned_as_far_to_the_other_side_just_before_lost_no_motor(swung: float, is_named: bool) -> None:
+    made = Made()
+    lost = made.after(50.0)
+    grow = np.clip((made.t - 50.0) / 0.5, 0.0, 1.0)[lost]
+    made.table["ATT"]["Roll"][made.after(49.0, 49.6)] = swung
+    made.table["ATT"]["Roll"][lost], made.table["ATT"]["Pitch"][lost] = -60.0 * grow, 40.0 * grow
+    made.table["RCOU"]["C2"][made.after(50.0, 52.0)] = 1950.0
+    made.table["RCOU"]["C1"][made.after(50.0, 52.0)] = 1100.0
+    for name, field in HEIGHTS:
+        made.table[name][field][lost] = np.clip(12.0 - 5.0 * (made.t[lost] - 50.0) ** 2, 0.0, None)
+    made.rows["ERR"] = [(54.0, {"Subsys": 12.0, "ECode": 1.0})]
+    assert any("gave no thrust" in title for title in titles(made)) == is_named

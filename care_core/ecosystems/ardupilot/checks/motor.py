@@ -75,6 +75,9 @@ _CLEARLY = LIMITS.add("that output above its peers", 0.15, "of the range", "a ch
 _MOSTLY = LIMITS.add("share of records in which it is the highest", 0.6, "", "a choice: else motors take turns")
 _LEANS_S = LIMITS.add("time over which its lean is taken", 0.3, "s", "a choice: then it turns")
 _FALL_S = LIMITS.add("fall to the side that lost it", 1.2, "s", "a choice: then it tumbles")
+_SWINGS_S = LIMITS.add(
+    "time in which a swing comes back", 2.0, "s", "a choice: vehicles swing once a second and faster"
+)
 _AT_LIMIT = LIMITS.add("output at its limit", 0.97, "of the range", "a choice: outputs are rounded")
 _LIMITED = LIMITS.add("critical share of the time at its limit", 0.2, "", "a choice: nothing is left to give")
 _FAR = LIMITS.add("critical excess, in limits", 4.0, "", "a choice")
@@ -316,7 +319,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         return
     roll = float(np.mean((table["Roll"] - table["DesRoll"])[rows]))
     pitch = float(np.mean((table["Pitch"] - table["DesPitch"])[rows]))
-    if np.hypot(roll, pitch) < _TIPS_DEG:
+    if np.hypot(roll, pitch) < _TIPS_DEG or _swung_over(table, lost, roll, pitch):
         return
     down = flight.impact_s if flight.impact_s is not None else lost + 2.0
     windows = ((lost - 0.2, lost + 0.8), (lost - 1.0, max(lost, min(lost + 2.0, down))), (lost - 3.0, lost + 2.0))
@@ -346,6 +349,15 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     )  # fmt: skip
 
 
+def _swung_over(table: Table, lost: float, roll: float, pitch: float) -> bool:
+    """Whether it was as far off its demand to the other side just before: the corner of a motor that gives nothing
+    sinks from the first, what swings goes to and fro."""
+    rows = (table.t >= lost - _SWINGS_S) & (table.t < lost - _LEANS_S)
+    off = (table["Roll"] - table["DesRoll"])[rows], (table["Pitch"] - table["DesPitch"])[rows]
+    towards = (roll * off[0] + pitch * off[1]) / np.hypot(roll, pitch)
+    return bool(len(towards)) and float(np.min(towards)) < -_TIPS_DEG
+
+
 def _driven_hardest(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     """The motor that was driven hardest, alone, just before control was lost, and was the first near its limit."""
     lost, table = flight.lost_control_s, flight.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
@@ -366,6 +378,8 @@ def _driven_hardest(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         -float(np.mean((table["Pitch"] - table["DesPitch"])[rows])),
         float(np.mean((table["Roll"] - table["DesRoll"])[rows])),
     )
+    if any(fall) and _swung_over(table, lost, fall[1], -fall[0]):
+        return
     numbers = tuple(motor.number for motor in outputs.motors)
     commands = Commands(outputs.t[around], outputs.share(around), numbers)
     arms = {motor.number: motor.angle_deg for motor in outputs.motors if motor.place}
