@@ -261,3 +261,18 @@ def test_what_leaned_as_far_to_the_other_side_just_before_lost_no_motor(swung: f
         made.table[name][field][lost] = np.clip(12.0 - 5.0 * (made.t[lost] - 50.0) ** 2, 0.0, None)
     made.rows["ERR"] = [(54.0, {"Subsys": 12.0, "ECode": 1.0})]
     assert any("gave no thrust" in title for title in titles(made)) == is_named
+
+
+@pytest.mark.parametrize(
+    ("follows", "says"), [(True, "it had turned as told until then"), (False, "turning direction")]
+)
+def test_what_turned_as_told_has_no_motor_that_turns_the_wrong_way(follows: bool, says: str) -> None:
+    made = Made()
+    zero = np.zeros_like(made.t)
+    wanted = np.where(made.after(20.0, 24.0), 60.0, 0.0)
+    turns = np.where(made.after(40.0, 60.0), 30.0 + 3.0 * (made.t - 40.0), wanted if follows else 0.0)
+    pushes = np.where(made.after(40.0, 60.0), -0.5, 0.0)
+    made.table["RATE"] = {"R": zero, "P": zero, "RDes": zero, "PDes": zero, "ROut": zero, "POut": zero,
+                          "Y": turns, "YDes": wanted, "YOut": pushes}  # fmt: skip
+    (spin,) = [one for one in every_finding(made.find()) if one.title == "it spins against its control"]
+    assert says in spin.evidence

@@ -36,6 +36,7 @@ _YAW_LASTS_S = LIMITS.add("shortest time off the heading", 3.0, "s", "a choice")
 _SPINS_DPS = LIMITS.add("turn against its control", 40.0, "deg/s", "a choice: gusts turn it slower")
 _PUSHES = LIMITS.add("output that is to turn it back", 0.2, "of the range", "a choice: less hardly turns it")
 _SPINS_S = LIMITS.add("shortest turn against its control", 2.0, "s", "a choice: a blow is countered sooner")
+_NEARLY = LIMITS.add("rate off a turn that is followed", 0.5, "of it", "a choice: rates lag as a turn begins")
 _TURNED = LIMITS.add("probability of wrong turning directions", 0.7, "", "a choice: yaw that is spent shows alike")
 _WAVERS_DEG = LIMITS.add("heading that wavers in a turn", 10.0, "deg", "a choice")
 _NEARER = LIMITS.add("share of the error left after a turn", 0.6, "", "a choice")
@@ -194,20 +195,30 @@ def _spins(flight: Flight) -> Iterator[Finding]:
     if spans:
         start, end = spans[0]
         most = float(np.max(np.abs(rate[(t >= start) & (t <= end)])))
+        had_turned = _turned_as_told(flight, table, start)
+        why = (
+            ", though it had turned as told until then: something struck or holds it, or a motor gave way"
+            if had_turned
+            else ": motors or propellers of the wrong turning direction, or a frame type that is not its own"
+        )
         yield Finding(
             kind="attitude",
             title="it spins against its control",
             onset_s=start,
             end_s=end,
             severity="critical",
-            evidence=(
-                f"it turns faster and faster, up to {most:.0f} deg/s, with the motors told to turn it back: motors or "
-                "propellers of the wrong turning direction, or a frame type that is not its own"
-            ),
+            evidence=f"it turns faster and faster, up to {most:.0f} deg/s, with the motors told to turn it back{why}",
             source="RATE.Y, YDes, YOut",
-            suspect="operation",
-            probability=_TURNED,
+            suspect="hardware" if had_turned else "operation",
+            probability=_LOST if had_turned else _TURNED,
         )
+
+
+def _turned_as_told(flight: Flight, table: Table, until: float) -> bool:
+    """Whether its motors turned it in flight, as fast as they were told: then all turn the way that they should."""
+    t, wanted = table.t, table["YDes"]
+    followed = (np.abs(wanted) > _SPINS_DPS) & (np.abs(table["Y"] - wanted) < _NEARLY * np.abs(wanted))
+    return bool(lasting(t, followed & during(flight.flown, t) & (t < until), _SPINS_S))
 
 
 def _is_a_turn(off: Floats) -> bool:
