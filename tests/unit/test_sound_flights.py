@@ -276,3 +276,16 @@ def test_what_turned_as_told_has_no_motor_that_turns_the_wrong_way(follows: bool
                           "Y": turns, "YDes": wanted, "YOut": pushes}  # fmt: skip
     (spin,) = [one for one in every_finding(made.find()) if one.title == "it spins against its control"]
     assert says in spin.evidence
+
+
+@pytest.mark.parametrize(("sinks_ms", "noise_m", "landed"), [(0.0, 0.05, 1.0), (5.0, 0.05, 0.0), (0.0, 0.0, 0.0)])
+def test_what_keeps_its_height_once_its_motors_stop_stands_on_higher_ground(
+    sinks_ms: float, noise_m: float, landed: float
+) -> None:
+    made = Made()
+    off_s = DOWN_S + 5.0
+    height = np.clip(3.0 - sinks_ms * np.clip(made.t - off_s, 0.0, None), 0.0, None) + made.noise(noise_m)
+    for name, field in HEIGHTS:
+        made.table[name][field][made.after(60.0)] = height[made.after(60.0)]
+    mission = Mission(made.flight(), made.tables(), 5.0, off_s, True, {})
+    assert {one.name: one.value for one in plain_checks(mission)}["landed"] == landed

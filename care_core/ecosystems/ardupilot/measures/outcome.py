@@ -48,6 +48,8 @@ _SINKS_M = 20.0
 """No runway is so steep, and no barometer drifts so far in a flight's time."""
 _TOUCHED_S, _SWITCHED_OFF_S = 5.0, 0.05
 """Before the disarming, where the land detector found the ground: at most, and at least (disarming sets it as well)."""
+_FALLS_S = 2.0
+"""What is disarmed in the air falls by 20 m in this time."""
 HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
 """Where heights are told: above home, else above some other ground."""
 
@@ -177,7 +179,19 @@ def _landed(mission: Mission) -> Value:
     low = low or flight_of(mission).stands_at_end
     if not low and flight_of(mission).kind in _GLIDES:
         return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
-    return float(low)
+    return float(low or _stays_there(mission))
+
+
+def _stays_there(mission: Mission) -> bool:
+    """Whether it keeps its height once its motors stop: it stands on ground that is higher than its home. A height that
+    is only repeated tells nothing."""
+    known = flight_of(mission).height
+    if known is None:
+        return False
+    t, height = known
+    after = (t >= mission.end_s) & (t <= mission.end_s + _FALLS_S)
+    seen = t[after]
+    return len(seen) > 2 and float(np.ptp(seen)) > _FALLS_S / 2 and 0.0 < float(np.ptp(height[after])) < AIRBORNE_M
 
 
 def _unseen_end(mission: Mission) -> Unavailable | None:
