@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from care_core.ecosystems.explains import EXPLAINS, REFUSES, Explains
-from care_core.ecosystems.findings import Finding, FindingKind
+from care_core.ecosystems.findings import OWN_SUPPLY, UNCHARGED, Finding, FindingKind
 from care_core.records import replace
 
 SLACK_S = 1.5
@@ -96,6 +96,7 @@ def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
         and not any(one.severity == "info" and one.suspect in ("parameter", "operation") for one in (root, finding))
         and finding.kind in reach.get(root.kind, frozenset())
         and _may_refuse(root, finding)
+        and not (root.title == UNCHARGED and finding.title.startswith(OWN_SUPPLY))  # 5 V, out of any pack's rest
         and root.onset_s <= finding.onset_s + SLACK_S
         and root.end_s >= finding.onset_s - OVER_S
         and (finding.probability < LIKELY or (root.probability >= LIKELY and not _only_set(root, finding)))

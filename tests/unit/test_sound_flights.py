@@ -289,3 +289,12 @@ def test_what_keeps_its_height_once_its_motors_stop_stands_on_higher_ground(
         made.table[name][field][made.after(60.0)] = height[made.after(60.0)]
     mission = Mission(made.flight(), made.tables(), 5.0, off_s, True, {})
     assert {one.name: one.value for one in plain_checks(mission)}["landed"] == landed
+
+
+def test_a_pack_that_is_not_full_darkens_no_board() -> None:
+    made = Made()
+    made.table["BAT"]["Volt"] -= 1.1
+    made.table["POWR"]["Vcc"][made.after(20.0)] = 4.2
+    (pack,) = [one for one in made.find() if one.title == "the battery was not charged"]
+    assert not [one for one in pack.below if one.title.startswith("the autopilot's own supply")]
+    assert any(title.startswith("the autopilot's own supply") for title in titles(made))
