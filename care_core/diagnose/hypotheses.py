@@ -43,7 +43,7 @@ from care_core.diagnose.parts import OUTLASTED, is_late, never_flew, set_wrong
 from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.explains import EXPLAINS
-from care_core.ecosystems.findings import BATTERY_FAILSAFE, Finding, Severity, SuspectKind
+from care_core.ecosystems.findings import BATTERY_FAILSAFE, SAGS, Finding, Severity, SuspectKind
 from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.run import Evidence, FitVerdict
@@ -128,11 +128,16 @@ def hypotheses_of(failure: NoisyOr) -> tuple[Hypothesis, ...]:
     )
 
 
-def used_up(missed: Sequence[ObjectiveResult], findings: Iterable[Finding]) -> bool:
+def of_battery(missed: Sequence[ObjectiveResult], findings: Iterable[Finding]) -> bool:
     """Whether all that went wrong is a failsafe of the battery, whatever else was noticed on the way."""
-    others = any(one.severity == "critical" and (one.title != BATTERY_FAILSAFE or one.parameters) for one in findings)
+    others = any(one.severity == "critical" and (one.kind != "battery" or one.parameters) for one in findings)
     only = [one for one in missed if one.variable.name == "no_failsafe"]
     return not others and len(missed) == len(only) == 1 and only[0].reason.startswith(BATTERY_FAILSAFE)
+
+
+def used_up(findings: Iterable[Finding]) -> bool:
+    """Whether a battery that failed a run was flown until it had no more to give: its failsafe says no other reason."""
+    return all(one.title in (BATTERY_FAILSAFE, SAGS) for one in findings if one.severity == "critical")
 
 
 def unasked(
@@ -149,8 +154,9 @@ def unasked(
     if not missed and not critical:
         return ()
     options: dict[Key, float] = {("parameter", name): share for name, share in outside.items()}
-    if used_up(missed, findings):
-        options["world", OUTLASTED] = USED_UP.value
+    if of_battery(missed, findings):
+        if used_up(findings):
+            options["world", OUTLASTED] = USED_UP.value
         findings = [one for one in findings if one.kind == "battery" or "battery" in EXPLAINS[one.kind]]
     for finding in critical:
         named = shown[finding.title].options if shown and finding.title in shown else ()

@@ -13,7 +13,7 @@ from care_core.diagnose.hypotheses import UNTOLD_BY_FIT, hypotheses_of, unasked,
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, NoisyOr
 from care_core.diagnose.parts import OUTLASTED
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
-from care_core.ecosystems.findings import Finding, Severity, SuspectKind
+from care_core.ecosystems.findings import SAGS, UNCHARGED, Finding, Severity, SuspectKind
 from care_core.records import replace
 from care_core.run import Evidence
 from care_core.variables import Role, Threshold, Variable
@@ -129,6 +129,10 @@ def test_a_pack_that_a_flight_outlasts_needs_no_part_that_failed() -> None:
     assert lead(unasked([compass], missed=(failsafe, missed())))[0] == "hardware"
     motor = finding(0.9)
     assert lead(unasked([motor], missed=(failsafe,)))[0] == "hardware"
+    sags = replace(finding(0.25), kind="battery", title=SAGS)
+    assert lead(unasked([sags, compass], missed=(failsafe,))) == ("world", OUTLASTED)
+    drained = replace(finding(0.9), kind="battery", title=UNCHARGED)
+    assert lead(unasked([drained, compass], missed=(failsafe,))) == ("hardware", UNCHARGED)
 
 
 def test_without_a_model_only_a_failure_is_explained() -> None:

@@ -18,7 +18,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import BATTERY_FAILSAFE, NO_BATTERY, OWN_SUPPLY, UNCHARGED, Finding, Severity
+from care_core.ecosystems.findings import BATTERY_FAILSAFE, NO_BATTERY, OWN_SUPPLY, SAGS, UNCHARGED, Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median
 from care_core.text import log_time
@@ -103,7 +103,7 @@ def _sags(flight: Flight, table: Table, low: list[Span], lowest: float, cells: i
     failsafe = flight.battery_failsafe_s
     return Finding(
         kind="battery",
-        title="the battery sags under its load",
+        title=SAGS,
         onset_s=low[0][0],
         end_s=low[-1][1],
         severity="critical" if is_deep or failsafe is not None else "warning",
