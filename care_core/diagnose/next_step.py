@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
 from care_core.diagnose.records import Diagnosis, Fix, helps
-from care_core.ecosystems.findings import NOT_FLOWN, STEERED, Finding, FindingKind, every_finding
+from care_core.ecosystems.findings import IDLED, NOT_FLOWN, STEERED, Finding, FindingKind, every_finding
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, vehicle_of
 from care_core.logs.formats import MAVLINK_TLOG, format_named
@@ -88,8 +88,8 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
     parts = [name for name in named if name not in symptoms]
     if parts:
         return f"check on the bench: {listed(parts)}; then try it {trial(run)}"
-    if any(one.title == STEERED for one in findings):
-        return f"look at how it was steered: its throttle stick was at its bottom; then try it {trial(run)}"
+    if any(one.title in (IDLED, STEERED) for one in findings):
+        return f"look at how it was steered: its throttle stick was down; then try it {trial(run)}"
     misled = [name for name in named if symptoms[name] not in UPSETS]
     return f"look at what this names: {listed(misled)}; then try it {trial(run)}" if misled else bench(run)
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from care_core.ecosystems.findings import (
     CAME_DOWN,
+    IDLED,
     NO_BATTERY,
     NOT_BEGUN,
     OWN_SUPPLY,
@@ -107,4 +108,6 @@ def unmended(part: Finding) -> str:
     """Why no parameter is changed while this part has failed."""
     if is_pack(part):
         return f"{part.title}: charge or replace the battery; nothing is changed until it is full"
+    if part.title == IDLED:
+        return f"{part.title} at {log_time(part.onset_s)}: no parameter is changed for how it was steered"
     return f"{part.title} at {log_time(part.onset_s)}: nothing is changed until that is mended"

@@ -7,7 +7,7 @@ import pytest
 from care_core.diagnose.next_step import bench, next_step, trial, was_upset
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.diagnose.verdict import verdict_of
-from care_core.ecosystems.findings import NOT_FLOWN, STEERED, TOO_SHORT, Finding, Health
+from care_core.ecosystems.findings import IDLED, NOT_FLOWN, STEERED, TOO_SHORT, Finding, FindingKind, Health
 from care_core.records import replace
 from care_core.report.document import build_document, remembered_verdict
 from care_core.report.reading import remembered
@@ -94,8 +94,9 @@ def test_no_motor_is_checked_for_a_height_that_was_estimated_wrongly() -> None:
     assert said.startswith("look at what this names: the estimated height runs away; then try it in the simulator")
 
 
-def test_what_was_steered_into_the_ground_has_no_part_to_check() -> None:
-    steered = Finding("crash", STEERED, 40.0, 40.0, "critical", "", "", probability=0.1, suspect="operation")
+@pytest.mark.parametrize(("kind", "title"), [("crash", STEERED), ("attitude", IDLED)])
+def test_what_was_steered_into_the_ground_has_no_part_to_check(kind: FindingKind, title: str) -> None:
+    steered = Finding(kind, title, 40.0, 40.0, "critical", "", "", probability=0.1, suspect="operation")
     assert next_step(failed(steered), has_failed=True).startswith("look at how it was steered")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.dictionary import find_field
-from care_core.ecosystems.findings import Health
+from care_core.ecosystems.findings import IDLED, STEERED, Health
 from care_core.ecosystems.px4.attitude import lean_of
 from care_core.ecosystems.px4.examining import examine, reads
 from care_core.ecosystems.px4.flight import Px4Flight
@@ -297,6 +297,40 @@ def test_a_fall_without_a_blow_names_the_motor_that_gave_way() -> None:
 
     assert fallen(lies=True) == ["motor 3 (front left) gave no thrust"]
     assert "it hit the ground" not in " ".join(fallen(lies=False)), "it climbed again"
+
+
+@pytest.mark.parametrize(
+    ("mode", "field", "stick", "is_steered"),
+    [(15, "z", 0.1, True), (15, "throttle", -0.8, True), (15, "z", 0.5, False), (2, "z", 0.1, False)],
+)
+def test_a_stick_that_is_the_thrust_and_down_steers_into_the_ground(
+    mode: int, field: str, stick: float, is_steered: bool
+) -> None:
+    t = np.arange(0.0, 60.0, 0.1)
+    z = np.interp(t, [0, 12, 20, 30, 32, 60], [0, 0, -10, -10, 0, 0])
+    found = found_in({
+        "vehicle_local_position": Table(t, {"z": z, "vz": np.gradient(z, 0.1)}),
+        "vehicle_status": states(nav_state=[(0, mode)], arming_state=[(0, 1), (5, 2)]),
+        "manual_control_setpoint": Table(t, {field: np.where(t > 29.0, stick, 0.0 if field == "throttle" else 0.5)}),
+    }, **QUAD)  # fmt: skip
+    assert (STEERED in [title for _, title, _ in found]) == is_steered
+
+
+@pytest.mark.parametrize(("down_s", "mode", "idled"), [(29.0, 0, True), (30.2, 0, False), (29.0, 2, False)])
+def test_motors_that_idle_with_the_stick_down_hold_no_attitude(down_s: float, mode: int, idled: bool) -> None:
+    t = np.arange(0.0, 60.0, 0.1)
+    half = np.radians(np.interp(t, [30, 31, 60], [0, 80, 80])) / 2
+    level = {"q_d[0]": np.ones(len(t)), **{f"q_d[{n}]": np.zeros(len(t)) for n in (1, 2, 3)}}
+    found = found_in({
+        "vehicle_attitude": Table(t, {"q[0]": np.cos(half), "q[1]": np.sin(half), "q[2]": 0 * t, "q[3]": 0 * t}),
+        "vehicle_attitude_setpoint": Table(t, level),
+        "vehicle_status": states(nav_state=[(0, mode)], arming_state=[(0, 1), (5, 2)]),
+        "vehicle_land_detected": states(landed=[(0, 1), (12, 0)]),
+        "vehicle_local_position": states(z=[(0, 0.0), (12, -10.0)]),
+        "manual_control_setpoint": Table(t, {"z": np.where(t > down_s, 0.0, 0.5)}),
+    }, **QUAD)  # fmt: skip
+    (title,) = (title for kind, title, _ in found if kind == "attitude")
+    assert title == (IDLED if idled else "control was lost")
 
 
 def test_the_bare_denial_is_told_only_where_nothing_else_is() -> None:

@@ -45,6 +45,10 @@ MESSAGES: Dictionary = {
         "vehicle_type": Field(label="kind of vehicle"),
     }),
     "logged_messages": Message({"level": Field(label="level"), "message": Field(label="message")}, at_times=True),
+    "manual_control_setpoint": Message({
+        "z": Field(label="throttle stick, from 0"),
+        "throttle": Field(label="throttle stick, from -1"),
+    }),
     "vehicle_land_detected": Message({"landed": Field(label="on the ground", plausible=_SHARE)}),
     "mission_result": Message({
         "finished": Field(label="mission finished", plausible=_SHARE),
