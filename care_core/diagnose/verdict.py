@@ -350,6 +350,10 @@ def _failed(
     return "all objectives are within their thresholds" if part is None else f"{BUT}{_with_time(part)}"
 
 
+_CAME_DOWN = ("control was lost at ", "it hit the ground at ")
+"""How a shortfall begins of which a finding tells more."""
+
+
 def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding]) -> str:
     """What was missed, and the first critical findings: as much of it as two lines hold."""
     broken = list(dict.fromkeys(one.sentence for one in objectives if one.status == "fault"))
@@ -361,6 +365,8 @@ def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding
     if objectives and all(one.status == "ok" for one in objectives):
         found.append("every objective was met")
     first, *others = [clause for sentence in broken for clause in sentence.split("; ")] or found[:1]
+    told = {log_time(one.onset_s) for one in worst if one.kind in ("attitude", "crash")}
+    others = [one for one in others if not (one.startswith(_CAME_DOWN) and one.rpartition(" at ")[2] in told)]
     clauses = (first, *found, *others)
     return _in_lines(list(dict.fromkeys(clauses)), LINES * LINE - len(f"{STATUS_WORDS['fault']}: ") - LINE // 8)
 

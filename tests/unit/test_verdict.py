@@ -134,6 +134,16 @@ def test_the_first_cause_is_told_before_what_followed_and_no_headline_is_longer_
     assert len(wrapped(said)) <= 2
 
 
+def test_how_it_came_down_is_told_once() -> None:
+    short = "1 of 3 waypoints were reached; it hit the ground at 27.3 s; battery failsafe at 27.3 s"
+    failed = ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", short)
+    steered = Finding("crash", "it flew into the ground as steered", 27.3, 27.3, "critical", "", "")
+    assert verdict_on([failed], [steered]).failed == (
+        f"1 of 3 waypoints were reached; {steered.title} at 27.3 s; battery failsafe at 27.3 s"
+    )
+    assert "it hit the ground at 27.3 s" in verdict_on([failed], [replace(steered, onset_s=20.0)]).failed
+
+
 def test_a_critical_finding_of_a_run_that_met_its_objectives_is_a_fault_that_says_both() -> None:
     assert verdict_on([MET], [DRIFTS]).headline == (
         "FAULT: the barometer drifts at 166.1 s (2:46); every objective was met"
