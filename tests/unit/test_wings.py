@@ -100,6 +100,19 @@ def test_a_sensor_that_the_firmware_gave_up() -> None:
     assert "took it out of use at 70 s" in finding.evidence
 
 
+def test_telemetry_has_the_firmware_s_word_alone_for_a_sensor_that_failed() -> None:
+    flown = MadePlane()
+    del flown.table["ARSP"]
+    said = "Airspeed sensor 1 failure. Disabling"
+    flown.rows["MSG"] += [(5.0, {"Message": said})]
+    assert found(flown, "airspeed") is None, "it had not taken off"
+    flown.rows["MSG"] += [(70.0, {"Message": said}), (80.0, {"Message": said})]
+    finding = found(flown, "airspeed")
+    assert finding is not None
+    assert (finding.title, finding.onset_s, finding.severity) == ("the airspeed sensor failed", 70.0, "warning")
+    assert "(2 times)" in finding.evidence
+
+
 def test_a_sensor_that_is_not_used_fails_nobody() -> None:
     flown = MadePlane()
     flown.settings["ARSPD_USE"] = 0

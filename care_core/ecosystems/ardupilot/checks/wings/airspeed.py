@@ -6,6 +6,7 @@ it is at odds with the estimate and flies on without it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -35,6 +36,8 @@ _FAILED = LIMITS.add("probability of a sensor that was given up", 0.9, "", "the 
 _LOST = LIMITS.add("probability that it costs the mission", 0.2, "", "0 of 3 training flights: it flies on without")
 _STALLS = LIMITS.add("probability of a part, in a stall", 0.3, "", "a choice: speeds and gains make it stall as well")
 _HIGH_M = 15.0
+SENSOR_FAILED = "the airspeed sensor failed"
+_FAILS = re.compile(r"Airspeed sensor \d+ failure\. Disabling")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -44,7 +47,9 @@ def find(flight: Flight) -> Iterator[Finding]:
     moved = flight.one("GPS", "Spd")
     sensor = flight.one("ARSP", "Airspeed")
     is_frozen = bool(flight.repeats("ARSP"))  # told as such
-    if sensor is not None and moved is not None and flight.setting("ARSPD_USE") != 0 and not is_frozen:
+    if sensor is None:
+        yield from _said_to_fail(flight)
+    elif moved is not None and flight.setting("ARSPD_USE") != 0 and not is_frozen:
         yield from _given_up(flight, sensor, moved)
     if flight.kind == "plane":
         yield from _stall(flight)
@@ -66,7 +71,7 @@ def _given_up(flight: Flight, sensor: Table, moved: Table) -> Iterator[Finding]:
     ground = float(np.mean(np.interp(t, moved.t, moved["Spd"])[during(spans, t)]))
     yield Finding(
         kind="airspeed",
-        title="the airspeed sensor failed",
+        title=SENSOR_FAILED,
         onset_s=start,
         end_s=end,
         severity="warning",
@@ -78,6 +83,24 @@ def _given_up(flight: Flight, sensor: Table, moved: Table) -> Iterator[Finding]:
         probability=_FAILED,
         mission_lost=_LOST,
     )
+
+
+def _said_to_fail(flight: Flight) -> Iterator[Finding]:
+    """The firmware's word alone, where the log does not hold what the sensor read, as telemetry does not."""
+    said = [(t, text) for t, text in flight.messages if _FAILS.match(text) and during(flight.flown, np.array([t]))[0]]
+    if said:
+        often = f" ({len(said)} times)" if len(said) > 1 else ""
+        yield Finding(
+            kind="airspeed",
+            title=SENSOR_FAILED,
+            onset_s=said[0][0],
+            end_s=said[-1][0],
+            severity="warning",
+            evidence=f"the firmware says: {said[0][1]}{often}",
+            source="MSG; AP_Airspeed_Health.cpp",
+            probability=_FAILED,
+            mission_lost=_LOST,
+        )
 
 
 def _stall(flight: Flight) -> Iterator[Finding]:
