@@ -12,7 +12,7 @@ def examine(model: RunModel) -> Health:
     """Timeline and findings of a log."""
     log = model.log
     health = ecosystem_of(log.format).examine(model)
-    if not health.too_little or any(one.severity != "info" for one in health.findings):
+    if not health.too_little or any(_says_more(one) for one in health.findings):
         return health
     # An answer too: whoever reads the findings must not take none for fine.
     nothing = Finding(
@@ -26,3 +26,8 @@ def examine(model: RunModel) -> Health:
         suspect="world",
     )
     return replace(health, findings=(*health.findings, nothing))
+
+
+def _says_more(finding: Finding) -> bool:
+    """Whether a finding is an answer by itself: what kept the vehicle from arming, or what failed."""
+    return finding.kind == "prearm" or finding.severity == "critical"

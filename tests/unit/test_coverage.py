@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from care_core.ecosystems import examine as examining
 from care_core.ecosystems.coverage import EXTREME, MEAN, SUM, Samples, doubt, unseen, usual_pause
 from care_core.ecosystems.examine import examine
+from care_core.ecosystems.findings import NOT_FLOWN, Finding, FindingKind, Health, Severity
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, find_extractor
 from care_core.ecosystems.registry import run_model
 from care_core.extract.plain import read_plain_runs
@@ -22,7 +25,7 @@ from care_core.profile.reading import read_schema
 from care_core.run import Unavailable, Value
 from tests.flights import ARMED_S, DOWN_S, FACTS, Made
 from tests.goal_drives import drive
-from tests.tables import TablesLog, read
+from tests.tables import TablesLog, no_model, read
 
 PROFILES = Path(__file__).resolve().parents[2] / "profiles"
 
@@ -319,3 +322,16 @@ def test_energy_of_two_batteries_needs_the_whole_record_of_both() -> None:
     energy = find_extractor("energy_used").compute
     assert isinstance(energy(flown(second(1e9)), {}), float)
     assert isinstance(energy(flown(second(40.0)), {}), Unavailable)
+
+
+@pytest.mark.parametrize(
+    ("kind", "severity", "answers"), [("log", "warning", False), ("prearm", "warning", True), ("log", "critical", True)]
+)
+def test_that_nothing_was_flown_is_told_unless_something_answers_why(
+    kind: FindingKind, severity: Severity, answers: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = Finding(kind, "told", 1.0, 2.0, severity, "", "")
+    health = Health("", (), (one,), too_little=NOT_FLOWN)
+    monkeypatch.setattr(examining, "ecosystem_of", lambda _: SimpleNamespace(examine=lambda _: health))
+    titles = [one.title for one in examining.examine(no_model()).findings]
+    assert titles == (["told"] if answers else ["told", NOT_FLOWN])
