@@ -12,6 +12,7 @@ SNIFF_BYTES = 4096
 
 _TEXT_FORMAT = re.compile(rb"(?m)^FMT, ?\d+, ?\d+, ?\w+")
 _MAVLINK_MARKERS = (0xFD, 0xFE)
+_PRINTED = re.compile(rb"[\t\r\n -~]+")
 
 
 class LogFormat(Record):
@@ -38,8 +39,13 @@ class LogFormat(Record):
 
 
 def is_raw_mavlink(head: bytes) -> bool:
-    """Whether a file is a stream of MAVLink packets without the time stamps of a ground station (.rlog, .tlog.raw)."""
-    return _frame_is_followed(head, 0, stamp=0)
+    """Whether a file is a stream of MAVLink packets without the time stamps of a ground station (.rlog, .tlog.raw). A
+    vehicle that starts may print text between them."""
+    if _frame_is_followed(head, 0, stamp=0):
+        return True
+    end = _frame_end(head, 0)
+    printed = None if end is None else _PRINTED.match(head, end)
+    return printed is not None and _frame_is_followed(head, printed.end(), stamp=0)
 
 
 def _is_dataflash(head: bytes) -> bool:
@@ -60,14 +66,21 @@ def _is_mavlink(head: bytes) -> bool:
     )
 
 
-def _frame_is_followed(head: bytes, at: int, stamp: int = 8) -> bool:
-    """Whether a MAVLink packet begins here, and after it and a stamp of this many bytes the next, or the file's end."""
+def _frame_end(head: bytes, at: int) -> int | None:
+    """Where a MAVLink packet ends that begins here; None where none does."""
     if at + 3 > len(head) or head[at] not in _MAVLINK_MARKERS:
-        return False
+        return None
     is_v2 = head[at] == 0xFD
     if is_v2 and head[at + 2] & ~1:
+        return None
+    return at + head[at + 1] + (12 + 13 * head[at + 2] if is_v2 else 8)
+
+
+def _frame_is_followed(head: bytes, at: int, stamp: int = 8) -> bool:
+    """Whether a MAVLink packet begins here, and after it and a stamp of this many bytes the next, or the file's end."""
+    end = _frame_end(head, at)
+    if end is None:
         return False
-    end = at + head[at + 1] + (12 + 13 * head[at + 2] if is_v2 else 8)
     follows = end + stamp < len(head) and head[end + stamp] in _MAVLINK_MARKERS
     return follows or (len(head) < SNIFF_BYTES and len(head) - 8 <= end <= len(head))
 

@@ -190,6 +190,16 @@ def test_packets_without_stamps_have_the_time_that_they_carry(tmp_path: Path) ->
     assert log.damage == ()
 
 
+def test_what_a_vehicle_prints_as_it_starts_hides_no_packets(tmp_path: Path) -> None:
+    station = Station()
+    for ms in (1000, 1100, 1200):
+        station.hear(mavlink.MAVLink_attitude_message(ms, 0.1, 0.5, 0.0, 0.0, 0.0, 0.0))
+    first, *others = [part[8:] for part in station.parts]
+    path = tmp_path / "a.tlog.raw"
+    path.write_bytes(b"".join((first, b"init()\r\n", *others)))
+    assert len(open_log(path).read({"ATTITUDE": ("roll",)})["ATTITUDE"]) == 3
+
+
 def test_packets_that_carry_no_time_and_have_no_stamp_are_refused_by_name(tmp_path: Path) -> None:
     station = Station()
     for _ in range(9):
