@@ -687,6 +687,8 @@ def test_parameters_changed_in_the_air() -> None:
     )}  # fmt: skip
     (finding,) = find(flight_of(made.tables(), changed, flight.log.facts, END_S))
     assert (finding.title, finding.severity) == ("parameters were changed in the air", "info")
+    driven = find(flight_of(made.tables(), changed, {"firmware": "ArduRover V4.5.4", "vehicle": "rover"}, END_S))
+    assert [one.title for one in driven if one.kind == "tuning"] == ["parameters were changed under way"]
 
 
 def test_old_names_and_units_are_read() -> None:

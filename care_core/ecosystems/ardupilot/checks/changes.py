@@ -10,7 +10,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 from care_core.ecosystems.changed_in_flight import LIMITS, Change, Upset
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.vehicles import motors_of
+from care_core.ecosystems.vehicles import flies, motors_of
 from care_core.logs.base import Wanted, merge_needs
 from care_core.run import shown
 
@@ -46,7 +46,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     found = list(changed_in_flight.find(changed, _upsets(flight), motors, is_lost=is_lost, source="PARM"))
     yield from found
     named = {name for one in found for name in one.parameters}
-    yield from _noted([one for one in changed if one.name.startswith(_RISKY) and one.name not in named])
+    risky = [one for one in changed if one.name.startswith(_RISKY) and one.name not in named]
+    yield from _noted(risky, "in the air" if flies(flight.kind) else "under way")
 
 
 def _upsets(flight: Flight) -> Iterator[Upset]:
@@ -64,11 +65,11 @@ def _was_put_right(change: Change) -> bool:
     return change.name in _PUT_RIGHT and isinstance(change.before, float | int) and change.before <= 0
 
 
-def _noted(changed: list[Change]) -> Iterator[Finding]:
+def _noted(changed: list[Change], where: str) -> Iterator[Finding]:
     if changed:
         yield Finding(
             kind="tuning",
-            title="parameters were changed in the air",
+            title=f"parameters were changed {where}",
             onset_s=changed[0].time_s,
             end_s=changed[-1].time_s,
             severity="info",
