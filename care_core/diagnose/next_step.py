@@ -86,8 +86,10 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
     though nothing says why it did."""
     symptoms = {one.title: one.kind for one in findings if one.kind in SYMPTOMS}
     parts = [name for name in named if name not in symptoms]
+    around = {one.title for one in findings if one.kind == "blocked"}
     if parts:
-        return f"check on the bench: {listed(parts)}; then try it {trial(run)}"
+        how = "look at what this names" if around.issuperset(parts) else "check on the bench"
+        return f"{how}: {listed(parts)}; then try it {trial(run)}"
     if any(one.title in (IDLED, STEERED) for one in findings):
         return f"look at how it was steered: its throttle stick was down; then try it {trial(run)}"
     misled = [name for name in named if symptoms[name] not in UPSETS]

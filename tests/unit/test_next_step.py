@@ -100,6 +100,13 @@ def test_what_was_steered_into_the_ground_has_no_part_to_check(kind: FindingKind
     assert next_step(failed(steered), has_failed=True).startswith("look at how it was steered")
 
 
+def test_what_holds_a_vehicle_is_not_on_the_bench() -> None:
+    held = Finding("blocked", "something holds it", 40.0, 60.0, "critical", "", "", probability=0.9, suspect="world")
+    crashed = Finding("crash", "it crashed", 60.0, 60.0, "critical", "", "", probability=0.1)
+    named = replace(failed(held, crashed), hypotheses=(Hypothesis("world", held.title, 0.9),))
+    assert next_step(named, has_failed=True).startswith("look at what this names: something holds it; then try it")
+
+
 def test_a_symptom_is_no_part_to_check() -> None:
     lost = Finding("attitude", "control was lost", 50.0, 60.0, "critical", "", "", probability=0.3)
     named = replace(failed(lost), hypotheses=(Hypothesis("hardware", lost.title, 0.7), Hypothesis("chance", "", 0.3)))

@@ -34,6 +34,8 @@ STANDS_MS = 0.5
 _LEANS_DEG, _HELD_S = 15.0, 10.0
 """A lean of 15 degrees speeds a copter up by 2.6 m/s^2, to 26 m/s in 10 s, and ANGLE_MAX allows 30 or 45 as shipped. A
 gale holds such a lean still as well, but strikes nothing."""
+_STILL_MS, _LEANS_FAR_DEG, _STILL_S = 0.15, 20.0, 5.0
+"""Nor does a gale of 15 m/s, in which a lean so far stands still, let a copter rest so: its gusts move it."""
 _STANDS_S, _WALKS_MS, _IDLES = 5.0, 1.5, 0.1
 """What stood for so long, no faster than a receiver's speed wanders, with less throttle than taxiing takes."""
 _LIFTS = 0.2
@@ -41,6 +43,11 @@ _LIFTS = 0.2
 _REFUSED_S = 30.0
 """The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
 _ERR_BATTERY = 6
+
+
+def _lasting(t: Floats, held: Mask, least_s: float) -> tuple[Span, ...]:
+    """Spans of at least so many seconds in which something is so."""
+    return tuple((a, b) for a, b in runs(t, held, gap_s=1.0) if b - a >= least_s)
 
 
 class Flight(Airborne):
@@ -63,23 +70,30 @@ class Flight(Airborne):
         return next((run for run in self.runs if t <= run.end_s), self)
 
     @cached_property
+    def first_blow_s(self) -> float:
+        """When it was first struck in flight, as far as sensors that clip or are shaken tell; infinite where never."""
+        begin = self.flown[0][0] if self.flown else math.inf
+        clips = (one.t[1:][(np.diff(one["Clip"]) > 0) & (one.t[1:] > begin)] for one in self.all("VIBE", "Clip"))
+        blows = [*(float(t[0]) for t in clips if len(t)), self.shock_after(begin)]
+        return min((t for t in blows if t is not None), default=math.inf)
+
+    @cached_property
     def held(self) -> tuple[Span, ...]:
         """Spans well above the ground, before it was lost, in which a copter that was struck leans as it is told and
-        yet stands: something holds it."""
-        moved = self.one("GPS", "Spd")
+        yet stands, or one that leans far rests: something holds it."""
+        moved = self.one("GPS", "Spd", "Status")
         if not self.is_copter or moved is None or not self.flown:
             return ()
         tilt, error, height = self.tilt, self.lean_error, self.height
         if tilt is None or error is None or height is None:
             return ()
-        begin = self.flown[0][0]
-        clips = (one.t[1:][(np.diff(one["Clip"]) > 0) & (one.t[1:] > begin)] for one in self.all("VIBE", "Clip"))
-        blows = [*(float(t[0]) for t in clips if len(t)), self.shock_after(begin)]
-        struck = min((t for t in blows if t is not None), default=math.inf)
         leans = (np.interp(moved.t, *tilt) > _LEANS_DEG) & (np.interp(moved.t, *height) > AIRBORNE_M)
         leans &= np.interp(moved.t, *error) < FOLLOWED_DEG
-        stands = (moved["Spd"] < STANDS_MS) & (moved.t > struck) & during(self.flown, moved.t)
-        return tuple((a, b) for a, b in runs(moved.t, leans & stands, gap_s=1.0) if b - a >= _HELD_S)
+        leans &= during(self.flown, moved.t) & (moved["Status"] >= FIX)
+        stands = leans & (moved["Spd"] < STANDS_MS) & (moved.t > self.first_blow_s)
+        rests = leans & (moved["Spd"] < _STILL_MS) & (np.interp(moved.t, *tilt) > _LEANS_FAR_DEG)
+        long = ((stands, _HELD_S), (rests, _STILL_S))
+        return next(filter(None, (_lasting(moved.t, held, least_s) for held, least_s in long)), ())
 
     def refused_for(self, *words: str, but: str | None = None) -> float | None:
         """When arming was first refused with one of these words, and without another, where that still stood at the

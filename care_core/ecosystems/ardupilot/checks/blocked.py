@@ -70,13 +70,14 @@ def _held(flight: Flight) -> Iterator[Finding]:
         t, tilt = flight.tilt
         lean = float(median(tilt[during(flight.held, t)]))
         lasted = sum(b - a for a, b in flight.held)
+        blow = ", after an impact" if flight.first_blow_s < start else ""
         yield Finding(
             kind="blocked",
             title="something holds it: it leans and does not move",
             onset_s=start,
             end_s=end,
             severity="critical",
-            evidence=f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} deg, after an impact",
+            evidence=f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} deg{blow}",
             source="ATT, GPS.Spd; blows by VIBE.Clip and IMU",
             suspect="world",
             probability=_HELD,
