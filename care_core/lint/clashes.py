@@ -30,6 +30,9 @@ class Clash(NamedTuple):
 
 _NUMBERS = tuple(map(str, range(1, 17)))
 _BATTERIES = ("", *map(str, range(2, 10)))
+_COPTER_LOOPS = ("PSC_POSXY", "PSC_POSZ", "PSC_VELZ", "PSC_ACCZ", "ATC_ANG_RLL", "ATC_ANG_PIT", "ATC_ANG_YAW")
+_PLANE_LOOPS = tuple(one.replace("PSC_", "Q_P_").replace("ATC_", "Q_A_") for one in _COPTER_LOOPS)
+"""Loops of which a copter or quadplane does not arm without the gain."""
 _ARMING = "it refuses to arm"
 _NOTE = Severity.NOTE
 _EKF_SOURCE = "AP_NavEKF_Source.cpp, pre_arm_check"
@@ -70,6 +73,10 @@ ARDUPILOT: tuple[Clash, ...] = (
     Clash("BATT{n}_VOLT_MULT = 0; BATT{n}_MONITOR >= 3; BATT{n}_MONITOR <= 4",
           "BATT{n}_VOLT_MULT is 0: every voltage reads 0.", "Calibrate it with a voltmeter.",
           "AP_BattMonitor_Analog.cpp", _BROKEN, numbers=_BATTERIES),
+    Clash("BATT{n}_LOW_VOLT = BATT{n}_CRT_VOLT; BATT{n}_CRT_VOLT > 0; BATT{n}_FS_LOW_ACT > 0",
+          "BATT{n}_LOW_VOLT equals BATT{n}_CRT_VOLT ({BATT{n}_CRT_VOLT} V): the battery is critical at once, and what "
+          "BATT{n}_FS_LOW_ACT asks for is never done.", "Set the low voltage higher.", "ArduPilot/ardupilot #22631",
+          numbers=_BATTERIES),
     Clash("BATT_FS_LOW_ACT > 0; BATT_MONITOR = 0", "BATT_FS_LOW_ACT never acts: BATT_MONITOR is 0.",
           "Say which sensor measures the battery.", "AP_BattMonitor"),
     # Motors
@@ -82,6 +89,12 @@ ARDUPILOT: tuple[Clash, ...] = (
           "Set both, or none.", "AP_MotorsMulticopter.cpp, check_mot_pwm_params", _BROKEN, numbers=("MOT", "Q_M")),
     Clash("{n}_PWM_MAX <= 0; {n}_PWM_MIN > 0", f"Of {{n}}_PWM_MIN and {{n}}_PWM_MAX one is set: {_ARMING}.",
           "Set both, or none.", "AP_MotorsMulticopter.cpp, check_mot_pwm_params", _BROKEN, numbers=("MOT", "Q_M")),
+    *(
+        Clash(f"{{n}}_P <= 0; {vehicle}", "{n}_P is {{n}_P}: nothing holds what it controls, and since 4.1 "
+              f"{_ARMING}.", "Give it the firmware's own value back.",
+              "AC_PosControl.cpp and AC_AttitudeControl.cpp, pre_arm_checks", _BROKEN, numbers=loops)
+        for vehicle, loops in (("FRAME_CLASS > 0", _COPTER_LOOPS), ("Q_ENABLE > 0", _PLANE_LOOPS))
+    ),
     Clash("FRAME_CLASS = 0; MOT_SPIN_ARM >= 0", f"FRAME_CLASS is 0: no motor is mixed, and {_ARMING}.",
           "Say which frame it is: 1 has four motors, 2 six.", "Copter: Check frame class", _BROKEN, _NOTE),
     Clash("PILOT_SPEED_UP <= 0", f"PILOT_SPEED_UP is {{PILOT_SPEED_UP}}: the pilot cannot climb, and {_ARMING}.",
@@ -133,6 +146,9 @@ ARDUPILOT: tuple[Clash, ...] = (
           f"{_ARMING}.", "It is in hundredths of a degree: 2000 is usual.", "ArduPlane/AP_Arming.cpp", _UNIT),
     Clash("LIM_ROLL_CD < 300; LIM_ROLL_CD > 0", f"LIM_ROLL_CD is {{LIM_ROLL_CD}} cdeg, under 3 degrees: {_ARMING}.",
           "It is in hundredths of a degree: 4500 is usual.", "ArduPlane/AP_Arming.cpp", _UNIT),
+    Clash("FS_LONG_TIMEOUT < FS_SHORT_TIMEOUT; FS_LONG_TIMEOUT > 0", "FS_LONG_TIMEOUT ({FS_LONG_TIMEOUT} s) is below "
+          f"FS_SHORT_TIMEOUT ({{FS_SHORT_TIMEOUT}} s): {_ARMING}.", "5 and 1.5 are usual.", "ArduPlane/AP_Arming.cpp",
+          _BROKEN),
     Clash("ALT_HOLD_RTL < 1000; ALT_HOLD_RTL > 0", "ALT_HOLD_RTL is {ALT_HOLD_RTL} cm: the plane comes home lower "
           "than trees.", "Is it in metres? 10000 is 100 m.", "ArduPilot's parameter list: centimetres up to 4.4",
           _UNIT),
@@ -144,6 +160,12 @@ PX4: tuple[Clash, ...] = (
           numbers=(*_NUMBERS, "17", "18")),
     Clash("COM_LOW_BAT_ACT = 0", "COM_LOW_BAT_ACT is 0: a battery that runs low is only reported.",
           "3 returns and lands.", _PX4_SAFETY, _HINDERS, _NOTE),
+    Clash("CBRK_SUPPLY_CHK = 894281; COM_LOW_BAT_ACT > 0",
+          "CBRK_SUPPLY_CHK is set: no battery counts as low, and COM_LOW_BAT_ACT is never done.",
+          "Set it to 0, unless a power supply feeds it.", "batteryCheck.cpp of PX4"),
+    Clash("COM_OBL_RC_ACT = 0; COM_RCL_EXCEPT >= 4; COM_RCL_EXCEPT < 8", "COM_OBL_RC_ACT is 0: when the offboard link "
+          "is lost, the pilot is to take over, and COM_RCL_EXCEPT lets it fly offboard without one.",
+          "Let it hold, return or land instead.", "PX4/PX4-Autopilot #26289"),
     Clash("GF_ACTION = 0; GF_MAX_HOR_DIST > 0", "GF_ACTION is 0: the fence of GF_MAX_HOR_DIST does nothing.",
           "2 holds, 3 returns.", "PX4's documentation of the geofence", _HINDERS, _NOTE),
     Clash("GF_ACTION = 0; GF_MAX_VER_DIST > 0", "GF_ACTION is 0: the fence of GF_MAX_VER_DIST does nothing.",

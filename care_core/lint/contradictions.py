@@ -23,6 +23,7 @@ class Pair(NamedTuple):
 
 
 _BATTERY = "a battery below the critical voltage was below the low one before"
+_REFUSED, _AIRSPEEDS = "the firmware calls such airspeeds invalid", "PerformanceModel.cpp of PX4, runSanityChecks"
 _MONITOR = "AP_BattMonitor's arming check refuses it"
 VEHICLE_PAIRS: tuple[Pair, ...] = (
     *(
@@ -43,6 +44,9 @@ VEHICLE_PAIRS: tuple[Pair, ...] = (
     Pair("BAT_CRIT_THR", "BAT_LOW_THR", _BATTERY, "PX4's battery thresholds follow each other"),
     Pair("BAT_EMERGEN_THR", "BAT_CRIT_THR", _BATTERY, "PX4's battery thresholds follow each other"),
     Pair("MPC_XY_CRUISE", "MPC_XY_VEL_MAX", "the speed is above its limit", "PX4's position controller limits it"),
+    Pair("FW_AIRSPD_STALL", "FW_AIRSPD_MIN", _REFUSED, _AIRSPEEDS),
+    Pair("FW_AIRSPD_MIN", "FW_AIRSPD_TRIM", _REFUSED, _AIRSPEEDS),
+    Pair("FW_AIRSPD_TRIM", "FW_AIRSPD_MAX", _REFUSED, _AIRSPEEDS),
     Pair("MPC_THR_MIN", "MPC_THR_MAX", "", "PX4's position controller scales by both"),
 )  # fmt: skip
 

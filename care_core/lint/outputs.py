@@ -8,6 +8,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 
+import numpy as np
+
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 
@@ -22,6 +24,8 @@ _HALVES = (
     (73, 74, "", "the right side (74)"), (74, 73, "", "the left side (73)"),
 )  # fmt: skip
 """Functions of which one goes with the other, and the output that has that one where the file leaves it at 0."""
+_OUTPUTS = range(1, 15)
+"""Outputs that every release lists: a file without all of them is an extract."""
 _SERIAL_GPS = (1, 2, 5, 6, 8, 10, 11, 13, 15, 16, 17, 18, 20, 24, 25, 26)
 """Receivers that are read from a serial port (AP_GPS.h)."""
 _GPS_PROTOCOL = 5
@@ -42,6 +46,9 @@ _PX4_PORT = re.compile(r"\w+_(CONFIG|CFG)")
 _PORTS = range(100, 500)
 """Serial ports by their index (generate_config.py); 1000 is Ethernet, which several share."""
 _PX4_MOTORS = range(101, 113)
+_LEAST_ROTORS = 4
+_SMALL = 1e-3
+_ALLOCATION = "PX4/PX4-Autopilot #23606; ActuatorEffectivenessRotors.cpp"
 _HEIGHT_SOURCES = {
     0: ("EKF2_BARO_CTRL", 1, "the barometer"), 1: ("EKF2_GPS_CTRL", 2, "the height of GPS"),
     3: ("EKF2_EV_CTRL", 2, "the height of external vision"),
@@ -117,6 +124,11 @@ def _motors(file: ConfigFile, values: Values) -> Iterator[Problem]:
         text += "it refuses to arm."
         hint = f"Motor {missing[0]} is function {wanted[missing[0] - 1]}."
         yield _warning(file, twice[-1], text, hint, "AP_Motors_Class.cpp: each motor needs an output", *twice[:-1])
+    elif missing and all(f"SERVO{number}_FUNCTION" in values for number in _OUTPUTS):
+        text = f"No output drives motor {', '.join(map(str, missing))} of this frame: since 4.3 it refuses to arm."
+        hint = f"Motor {missing[0]} is function {wanted[missing[0] - 1]} of its SERVOn_FUNCTION."
+        entry = values["Q_FRAME_CLASS" if is_plane else "FRAME_CLASS"]
+        yield _warning(file, entry, text, hint, "AP_MotorsMatrix.cpp, arming_checks: each motor needs an output")
 
 
 def _wheels(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -129,7 +141,10 @@ def _wheels(file: ConfigFile, values: Values) -> Iterator[Problem]:
         is_taken = not usual or bool(_whole(values, usual))
         if one in held and other not in held and is_taken and _whole(values, "SAIL_ENABLE") != 1:
             text = f"{held[one].name} is {one}, and no output has {what}: it refuses to arm."
-            yield _warning(file, held[one], text, "Assign the other as well.", "AP_MotorsUGV.cpp, pre_arm_check")
+            hint = "Assign the other as well."
+            if {73, 74} <= set(held):
+                hint = "Set it to 0: 73 and 74 drive and steer."
+            yield _warning(file, held[one], text, hint, "AP_MotorsUGV.cpp, pre_arm_check")
 
 
 def _receiver(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -180,6 +195,7 @@ def px4(file: ConfigFile, values: Values) -> Iterator[Problem]:
     """Channels, outputs, ports and height sources of a PX4 vehicle."""
     yield from _px4_channels(file, values)
     yield from _px4_motors(file, values)
+    yield from _px4_rotors(file, values)
     yield from _px4_ports(file, values)
     yield from _px4_height(file, values)
 
@@ -216,6 +232,27 @@ def _px4_motors(file: ConfigFile, values: Values) -> Iterator[Problem]:
         hint = "Leave one of them out, unless two ESCs are meant."
         names = tuple(one.name for one in more)
         yield problem_at("contradiction", Severity.NOTE, file, first, text, hint, source, names)
+
+
+def _px4_rotors(file: ConfigFile, values: Values) -> Iterator[Problem]:
+    """Rotors of a multicopter that all stand in one line, pairs of them at one place."""
+    count = _whole(values, "CA_ROTOR_COUNT") or 0
+    if _whole(values, "CA_AIRFRAME") or count < _LEAST_ROTORS:
+        return
+    places = [(values.get(f"CA_ROTOR{one}_PX"), values.get(f"CA_ROTOR{one}_PY")) for one in range(count)]
+    numbers = [(x.number or 0.0, y.number or 0.0, 1.0) for x, y in places if x is not None and y is not None]
+    if len(numbers) < count or any(_is_tilted(values, one) for one in range(count)):
+        return
+    rows = np.array(numbers)
+    if np.linalg.matrix_rank(rows / np.maximum(np.abs(rows).max(axis=0), _SMALL), tol=_SMALL) < rows.shape[1]:
+        text = "The rotors stand in a line: roll, pitch and thrust cannot be set apart from each other."
+        hint = "Check where CA_ROTORn_PX and PY put them, forwards and to the right."
+        yield problem_at("cannot-work", Severity.WARNING, file, values["CA_ROTOR_COUNT"], text, hint, _ALLOCATION)
+
+
+def _is_tilted(values: Values, rotor: int) -> bool:
+    axis = [values.get(f"CA_ROTOR{rotor}_A{one}") for one in "XY"]
+    return any(entry is not None and entry.number for entry in axis)
 
 
 def _px4_ports(file: ConfigFile, values: Values) -> Iterator[Problem]:

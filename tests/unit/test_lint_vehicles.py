@@ -26,7 +26,21 @@ PX4 = {
     "CA_ROTOR_COUNT": 4, "PWM_MAIN_FUNC1": 101, "PWM_MAIN_FUNC2": 102, "PWM_MAIN_FUNC3": 103, "PWM_MAIN_FUNC4": 104,
     "RC_MAP_ROLL": 1, "RC_MAP_PITCH": 2, "RC_MAP_THROTTLE": 3, "RC_MAP_YAW": 4,
 }  # fmt: skip
+PLANE = {
+    "TRIM_THROTTLE": 45, "LIM_ROLL_CD": 4500, "STALL_PREVENTION": 1, "TECS_CLMB_MAX": 5, "THR_FAILSAFE": 1,
+    "FS_LONG_TIMEOUT": 5, "FS_SHORT_TIMEOUT": 1.5,
+}  # fmt: skip
 RULES = ("contradiction", "cannot-work", "hinders", "wrong-unit")
+
+
+def rotors(*places: tuple[float, float]) -> dict[str, float]:
+    """Where rotors stand, forwards and to the right."""
+    held = {
+        f"CA_ROTOR{number}_P{axis}": at
+        for number, place in enumerate(places)
+        for axis, at in zip("XY", place, strict=True)
+    }
+    return {"CA_ROTOR_COUNT": len(places), **held}
 
 
 def found(tmp_path: Path, values: dict[str, float]) -> list[Problem]:
@@ -36,7 +50,7 @@ def found(tmp_path: Path, values: dict[str, float]) -> list[Problem]:
     return [one for one in linted.problems if one.rule in RULES]
 
 
-@pytest.mark.parametrize("values", [COPTER, ROVER, PX4])
+@pytest.mark.parametrize("values", [COPTER, PLANE, ROVER, PX4, PX4 | rotors((1, 1), (-1, -1), (1, -1), (-1, 1))])
 def test_a_vehicle_that_has_them_right_is_left_alone(tmp_path: Path, values: dict[str, float]) -> None:
     assert found(tmp_path, values) == []
 
@@ -70,7 +84,24 @@ def test_a_vehicle_that_has_them_right_is_left_alone(tmp_path: Path, values: dic
                      "INS_HNTCH_BW": 40},
             "contradiction", "INS_HNTCH_REF", "stays at INS_HNTCH_FREQ",
         ),
+        (
+            COPTER, {"BATT_LOW_VOLT": 13.2, "BATT_CRT_VOLT": 13.2, "BATT_FS_LOW_ACT": 2},
+            "contradiction", "BATT_LOW_VOLT", "equals BATT_CRT_VOLT (13.2 V)",
+        ),
+        (COPTER, {"PSC_ACCZ_P": 0}, "cannot-work", "PSC_ACCZ_P", "nothing holds what it controls"),
+        (
+            COPTER, {f"SERVO{number}_FUNCTION": 0 for number in range(4, 15)},
+            "contradiction", "FRAME_CLASS", "No output drives motor 4",
+        ),
+        (PLANE, {"FS_LONG_TIMEOUT": 1}, "cannot-work", "FS_LONG_TIMEOUT", "below FS_SHORT_TIMEOUT (1.5 s)"),
         (ROVER, {"SERVO3_FUNCTION": 56}, "contradiction", "SERVO1_FUNCTION", "no output has throttle"),
+        (
+            PX4, {"CBRK_SUPPLY_CHK": 894281, "COM_LOW_BAT_ACT": 3},
+            "contradiction", "CBRK_SUPPLY_CHK", "no battery counts as low",
+        ),
+        (PX4, {"COM_OBL_RC_ACT": 0, "COM_RCL_EXCEPT": 4}, "contradiction", "COM_OBL_RC_ACT", "without one"),
+        (PX4, {"FW_AIRSPD_MIN": 18, "FW_AIRSPD_TRIM": 17}, "contradiction", "FW_AIRSPD_MIN", "invalid"),
+        (PX4, rotors((1, 1), (-1, -1), (1, 1), (-1, -1)), "cannot-work", "CA_ROTOR_COUNT", "stand in a line"),
         (PX4, {"PWM_MAIN_FUNC4": 103}, "contradiction", "CA_ROTOR_COUNT", "no output drives motor 4"),
         (PX4, {"RC_MAP_YAW": 1}, "contradiction", "RC_MAP_YAW", "are both channel 1"),
         (PX4, {"MAV_0_CONFIG": 102, "GPS_1_CONFIG": 102}, "contradiction", "GPS_1_CONFIG", "both port 102"),
@@ -138,3 +169,14 @@ def test_a_file_older_than_the_lists_is_taken_for_the_vehicle_whose_names_it_has
     assert armed.severity is Severity.NOTE  # 70 of it is no 70 of MOT_SPIN_ARM
     assert lint_text([found]).count("RC10_REV") == 1
     assert "The same holds of 13 more: RC5_FUNCTION, line 6;" in " ".join(lint_text([found]).split())
+
+
+def test_a_rover_that_its_wheels_steer_is_told_to_leave_the_steering_out(tmp_path: Path) -> None:
+    (found_one,) = found(tmp_path, ROVER | {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74, "SERVO2_FUNCTION": 26})
+    assert found_one.parameter == "SERVO2_FUNCTION"
+    assert found_one.hint == "Set it to 0: 73 and 74 drive and steer."
+
+
+def test_an_extract_and_a_submarine_may_leave_out_outputs_and_gains(tmp_path: Path) -> None:
+    assert found(tmp_path, COPTER | {"SERVO4_FUNCTION": 0}) == []
+    assert found(tmp_path, {"FRAME_CONFIG": 1, "ATC_ANG_RLL_P": 0, "JS_GAIN_DEFAULT": 0.5, "FS_LEAK_ENABLE": 1}) == []
