@@ -32,8 +32,14 @@ def problem_at(
 
 
 def near(name: str, known: Iterable[str]) -> str:
-    """The known name that another is a slip of the pen for; empty where none is so near."""
-    return next(iter(get_close_matches(name, list(known), n=1, cutoff=_ALIKE)), "")
+    """The known name that another is a slip of the pen for; empty where none is so near. One of the same words in
+    another order is the nearest."""
+    words = sorted(name.split("_"))
+    known = list(known)
+    for one in known:
+        if sorted(one.split("_")) == words:
+            return one
+    return next(iter(get_close_matches(name, known, n=1, cutoff=_ALIKE)), "")
 
 
 def check(file: ConfigFile) -> Iterator[Problem]:

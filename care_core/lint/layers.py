@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.lint.readers import INFLATIONS, MARKING, OBSTACLES, Reader, Readers, warning
 from care_core.lint.scopes import COSTMAP, class_of, words_of
@@ -60,13 +61,17 @@ def _uncleared(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
 def _ordered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     """Layers of Nav2 that come too late in the list: it is the order in which they write into the costmap."""
     for reader in held.of(COSTMAP, "PluginContainerLayer"):
-        entry = reader.values.get("plugins")
-        off = {one.scope[-1] for one in held.within(reader.scope) if one.is_off("enabled")}
-        classes = {name: one for name in words_of(entry) if (one := reader.values.get(f"{name}.plugin"))}
-        listed = [(name, class_of(str(one.value))) for name, one in classes.items() if name not in off]
+        entry, listed = reader.values.get("plugins"), _listed(held, reader)
         if entry is not None:
             yield from _overwritten(file, reader, entry, listed)
             yield from _not_inflated(file, entry, listed)
+
+
+def _listed(held: Readers, costmap: Reader) -> Listed:
+    off = {one.scope[-1] for one in held.within(costmap.scope) if one.is_off("enabled")}
+    named = words_of(costmap.values.get("plugins"))
+    classes = {name: one for name in named if (one := costmap.values.get(f"{name}.plugin"))}
+    return [(name, class_of(str(one.value))) for name, one in classes.items() if name not in off]
 
 
 def _overwritten(file: ConfigFile, costmap: Reader, entry: Entry, listed: Listed) -> Iterator[Problem]:
@@ -113,4 +118,41 @@ def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         yield warning("contradiction", file, entry, text, hint, "obstacle_layer.cpp, onInitialize", others[:1])
 
 
-RULES = (_marks, _ordered, _sourced)
+def _beside(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Sources that stand beside an obstacle layer of Nav2, not in it: only layers read them."""
+    for costmap in held.of(COSTMAP):
+        entry = costmap.values.get("observation_sources")
+        layers = [one for one in held.within(costmap.scope) if one.is_a(*OBSTACLES)]
+        deaf = [
+            one for one in layers if f"{one.scope[-1]}.plugin" in costmap.values and not one.own("observation_sources")
+        ]
+        if entry is not None and deaf:
+            name = deaf[0].scope[-1]
+            text = f"observation_sources stands beside {name}, not in it: the layer hears no sensor."
+            hint = f"Move it below {name}, and what it names as well."
+            yield warning("cannot-work", file, entry, text, hint, "obstacle_layer.cpp, onInitialize")
+
+
+def _drifting(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """A map that is drawn into a costmap of the odometry: it is not moved to where the robot is found on it."""
+    for costmap in held.of(COSTMAP):
+        frame = costmap.values.get("global_frame")
+        is_global = any("global_costmap" in key for key in costmap.scope)
+        if frame is None or not is_global or costmap.is_on("rolling_window"):
+            continue
+        if str(frame.value).strip("/") == "odom" and _holds_map(file, held, costmap):
+            text = (
+                "global_frame is odom, and the map is drawn into it as it stands: as odometry drifts, it is elsewhere."
+            )
+            hint = "Set it to the frame of the map."
+            yield warning("hinders", file, frame, text, hint, "static_layer.cpp, updateCosts: not rolling")
+
+
+def _holds_map(file: ConfigFile, held: Readers, costmap: Reader) -> bool:
+    if file.format is ROS2_YAML:
+        return any(layer == "StaticLayer" for _, layer in _listed(held, costmap))
+    named = [class_of(kind) for keys, _, kind in file.named if keys == (*costmap.scope, "plugins")]
+    return "StaticLayer" in named if named else costmap.is_on("static_map")
+
+
+RULES = (_beside, _drifting, _marks, _ordered, _sourced)

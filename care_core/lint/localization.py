@@ -72,6 +72,7 @@ def check(file: ConfigFile) -> Iterator[Problem]:
         if is_filter(values):
             yield from _unread(file, values, _FILTER)
             yield from _sources(file, values)
+            yield from _headings(file, values)
             yield from _of_filter(file, values)
         elif _is_navsat(values):
             yield from _unread(file, values, _NAVSAT)
@@ -141,6 +142,25 @@ def _fused(file: ConfigFile, values: Values, source: str, entry: Entry) -> Itera
     if all(one is not None and one.value == "true" for one in both) and both[1] is not None and both[0] is not None:
         text = f"{source}_differential and {source}_relative are both true: only the first counts."
         yield warning("contradiction", file, both[1], text, "Switch one of them off.", _ROS_FILTER, [both[0]])
+
+
+def _headings(file: ConfigFile, values: Values) -> Iterator[Problem]:
+    """Odometry and an IMU that both say where the robot points to: they drift apart, and the filter jumps."""
+    found: dict[str, Entry] = {}
+    for name, entry in values.items():
+        match = _OF_SOURCE.fullmatch(name)
+        flags = re.findall(r"true|false", str(entry.value))
+        if match is None or match[2] != "config" or len(flags) != len(_STATE) or flags[_STATE.index("yaw")] != "true":
+            continue
+        modes = (values.get(f"{match[1]}_{mode}") for mode in ("differential", "relative"))
+        if not any(one is not None and one.value == "true" for one in modes):
+            found.setdefault(match[1].rstrip("0123456789"), entry)
+    if "odom" in found and "imu" in found:
+        odom, imu = found["odom"], found["imu"]
+        text = f"{odom.keys[-1]} and {imu.keys[-1]} both give the heading: they drift apart, and the filter jumps."
+        hint = "Take the heading from one, and the turn rate from the other."
+        source = "robot_localization's documentation of differential"
+        yield problem_at("hinders", Severity.NOTE, file, imu, text, hint, source, (odom.name,))
 
 
 def _of_filter(file: ConfigFile, values: Values) -> Iterator[Problem]:

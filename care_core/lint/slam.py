@@ -40,6 +40,8 @@ _OTHERS = (
 _MODES = ("mapping", "localization")
 _SOLVERS = ("solver_plugins::CeresSolver", "solver_plugins::GTSAMSolver", "solver_plugins::SpaSolver",
             "solver_plugins::G2oSolver")  # fmt: skip
+_OWN_ENDINGS = ("posegraph", "data")
+_ENDINGS = (*_OWN_ENDINGS, "yaml", "yml", "pgm", "png")
 _FRAMES = ("map_frame", "odom_frame", "base_frame")
 _COMMON = "slam_toolbox_common.cpp"
 
@@ -55,6 +57,7 @@ def check(file: ConfigFile) -> Iterator[Problem]:
             found.setdefault(entry.keys[at - 1], {})[".".join(entry.keys[at + 1 :])] = entry
     for values in found.values():
         yield from _names(file, values)
+        yield from _map(file, values)
         yield from _words(file, values)
         yield from _frames(file, values)
         yield from _numbers(file, values)
@@ -95,6 +98,18 @@ def _words(file: ConfigFile, values: Values) -> Iterator[Problem]:
         text = f"solver_plugin is {solver.value}, which no package of slam_toolbox brings: the node exits."
         hint = nearest(str(solver.value), _SOLVERS) or f"It is {_SOLVERS[0]} as it ships."
         yield problem_at("plugin-name", Severity.ERROR, file, solver, text, hint, "solver_plugins.xml")
+
+
+def _map(file: ConfigFile, values: Values) -> Iterator[Problem]:
+    """A map with an ending: the node adds its own."""
+    entry = values.get("map_file_name")
+    stem, dot, ending = str(entry.value).rpartition(".") if entry is not None else ("", "", "")
+    if entry is not None and dot and ending in _ENDINGS:
+        text = f"map_file_name ends in .{ending}, and the node adds .posegraph to it: no map is loaded."
+        hint = f"Write {stem}."
+        if ending not in _OWN_ENDINGS:
+            hint += " It is the pose graph that is loaded, not an image of the map: save that first."
+        yield warning("cannot-work", file, entry, text, hint, "serialization.hpp of slam_toolbox")
 
 
 def _frames(file: ConfigFile, values: Values) -> Iterator[Problem]:

@@ -26,6 +26,9 @@ CLASHES: tuple[Clash, ...] = (
     Clash("max_vel_x_backwards <= 0", "max_vel_x_backwards is {max_vel_x_backwards}: what TEB does then is undefined.",
           "Keep it above 0, and raise weight_kinematics_forward_drive against driving backwards.", _CHECKED,
           _HINDERS),
+    Clash("max_vel_trans < max_vel_x; max_vel_trans > 0", "max_vel_trans ({max_vel_trans}) is below max_vel_x "
+          "({max_vel_x}): the robot never drives so fast.", "Give both the same.",
+          "teb_local_planner_ros.cpp, saturateVelocity", "contradiction"),
     Clash("weight_adapt_factor < 1", "weight_adapt_factor is {weight_adapt_factor}: obstacles count less with every "
           "round.", "It must be 1 or more.", _CHECKED, _HINDERS),
     Clash("cmd_angle_instead_rotvel = true; wheelbase = 0", "cmd_angle_instead_rotvel is on, and wheelbase is 0: there "

@@ -56,6 +56,8 @@ ABOVE: tuple[Above, ...] = (
     Above(("move_base", "controller_server"), ("controller_frequency",), "no command is ever computed",
           "the control loop runs at this rate (move_base.cpp, controller_server.cpp)"),
     Above((COSTMAP,), ("update_frequency",), "the costmap is never updated", "costmap_2d_ros.cpp, mapUpdateLoop"),
+    Above((COSTMAP,), ("width", "height"), "there is no such costmap, and its cells fill the memory",
+          "ros-navigation/navigation2 #4005", zero=True),
     Above((COSTMAP,), ("transform_tolerance",), "every pose of the robot counts as too old",
           "costmap_2d_ros.cpp, getRobotPose"),
     Above((*PLANNERS, *CONTROLLERS), TOP_SPEEDS, "the robot may not drive forwards", _SPEED),

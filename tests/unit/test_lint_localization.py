@@ -33,6 +33,7 @@ def with_(*true: int) -> str:
         ((f"odom0_config: {ODOM}", "world_frame: world"), "contradiction", "neither map_frame nor odom_frame"),
         ((f"odom0_config: {ODOM}", "odom_frame: odom", "base_link_frame: odom"), "cannot-work", "are both odom"),
         ((f"odom0_config: {ODOM}", "process_noise_covariance: [0.1, 0.1]"), "cannot-work", "instead of 225"),
+        ((f"odom0_config: {with_(0, 1, 5)}", "imu0: /imu", f"imu0_config: {with_(5)}"), "hinders", "give the heading"),
         ((f"odom0_config: {ODOM}", "two_dmode: true"), "unknown-key", "two_dmode"),
         ((f"odom0_config: {ODOM}", "odom0_relativity: true"), "unknown-key", "odom0_relativity"),
     ],
@@ -41,6 +42,16 @@ def test_what_a_filter_cannot_fuse_or_join(tmp_path: Path, lines: tuple[str, ...
     (found,) = findings(tmp_path, ekf(*lines))
     assert found.rule == rule
     assert says in found.text
+
+
+def test_a_name_of_the_same_words_is_the_one_that_is_meant(tmp_path: Path) -> None:
+    (found,) = findings(tmp_path, ekf(f"odom0_config: {ODOM}", "base_link_output_frame: base"))
+    assert found.hint == "Did you mean base_link_frame_output?"
+
+
+def test_headings_of_which_one_counts_from_the_start_do_not_clash(tmp_path: Path) -> None:
+    imu = ("imu0: /imu", f"imu0_config: {with_(5)}", "imu0_relative: true")
+    assert told(tmp_path, ekf(f"odom0_config: {with_(0, 1, 5)}", *imu)) == []
 
 
 def test_a_filter_that_is_set_up_raises_nothing(tmp_path: Path) -> None:
@@ -77,6 +88,8 @@ def test_navsat_transform_counts_in_radians(tmp_path: Path, lines: tuple[str, ..
         ("transform_publish_period: 0.0", "cannot-work", "where odom is on the map"),
         ("throttle_scans: 0", "", ""),
         ("mode: maping", "not-in-values", "maping"),
+        ("map_file_name: maps/office.posegraph", "cannot-work", "ends in .posegraph"),
+        ("map_file_name: maps/office.v2", "", ""),
         ("solver_plugin: solver_plugin::CeresSolver", "plugin-name", "the node exits"),
         ("max_laser_rang: 5.0", "unknown-key", "max_laser_rang"),
         ("map_update_interval: 5", "wrong-type", "an integer"),

@@ -94,6 +94,7 @@ def of_teb(tmp_path: Path, values: dict[str, str], name: str = "TebLocalPlannerR
     ("values", "rule", "says"),
     [
         ({"dt_hysteresis": "0.3"}, "contradiction", "is not below dt_ref (0.3)"),
+        ({"max_vel_trans": "0.2"}, "contradiction", "max_vel_trans (0.2) is below max_vel_x (0.4)"),
         ({"inflation_dist": "0.1"}, "dead-key", "is not above min_obstacle_dist (0.2 m)"),
         ({"weight_optimaltime": "0"}, "hinders", "nothing draws the robot on"),
         ({"min_samples": "2"}, "cannot-work", "no trajectory of so few points"),
@@ -146,3 +147,40 @@ def test_that_nothing_was_found_is_said_with_what_was_not_judged(tmp_path: Path,
     path = tmp_path / "nav2.yaml"
     path.write_text(text)
     assert counted(lint([str(path)])).endswith(f"1 file{f'{says} that care knows' if says else ''}")
+
+
+def costmap(name: str, *lines: str) -> str:
+    return node(name, *lines).replace(f"{name}:\n", f"{name}:\n {name}:\n", 1)
+
+
+MAPPED = (
+    "plugins: [static_layer, obstacle_layer]", "static_layer:", "  plugin: nav2_costmap_2d::StaticLayer",
+    "obstacle_layer:", "  plugin: nav2_costmap_2d::ObstacleLayer", "  enabled: true",
+)  # fmt: skip
+SCAN = ("observation_sources: scan", "scan:", "  topic: /scan")
+INSIDE = tuple(f"  {line}" for line in SCAN)
+
+
+@pytest.mark.parametrize(
+    ("lines", "rule", "says"),
+    [
+        ((*MAPPED, *INSIDE, "global_frame: map"), "", ""),
+        ((*MAPPED, *INSIDE, "global_frame: odom"), "hinders", "as odometry drifts"),
+        ((*MAPPED, *INSIDE, "global_frame: odom", "rolling_window: true"), "", ""),
+        ((*MAPPED, *SCAN), "cannot-work", "stands beside obstacle_layer, not in it"),
+        ((*MAPPED, *INSIDE, "width: -20"), "cannot-work", "width is -20"),
+    ],
+)
+def test_a_costmap_lies_in_the_frame_of_its_map_and_its_layers_hear_their_sensors(
+    tmp_path: Path, lines: tuple[str, ...], rule: str, says: str
+) -> None:
+    found = [one for one in findings(tmp_path, costmap("global_costmap", *lines)) if one.severity.value != "note"]
+    assert [one.rule for one in found] == ([rule] if rule else [])
+    assert all(says in one.text for one in found)
+
+
+@pytest.mark.parametrize(("frame", "rules"), [("odom", ["hinders"]), ("map", [])])
+def test_a_map_of_move_base_lies_in_its_own_frame(tmp_path: Path, frame: str, rules: list[str]) -> None:
+    layers = '  plugins: [{name: static_layer, type: "costmap_2d::StaticLayer"}]\n'
+    text = f"global_costmap:\n  global_frame: {frame}\n  update_frequency: 2.0\n{layers}"
+    assert [one.rule for one in findings(tmp_path, text)] == rules
