@@ -34,7 +34,7 @@ OPTIONS, PATHS = 600, 200
 QUIET_S = 0.12
 """Nothing written for so long: the repaint is over."""
 PEERS = {
-    "lazygit": (("lazygit",), b"Commits", b"\x1b[B"),
+    "lazygit": (("setsid", "--ctty", "--wait", "lazygit"), b"Commits", b"\t"),  # it opens /dev/tty
     "harlequin": (("harlequin",), b"Query Editor", b"\t"),
     "posting": (("posting",), b"Collection", b"\t"),
     "btop": (("btop", "--utf-force"), b"mem", b"\x1b[B"),

@@ -65,7 +65,8 @@ class FiguredPage(Page):
         side.display = bool(rows)
         self.query_one("#left").display = self.choices.display or side.display  # else the text has the whole width
         if rows:
-            side.border_title = self.beside_title()
+            if side.border_title != self.beside_title():  # even the same title has the whole pane drawn
+                side.border_title = self.beside_title()
             side.show(Rows(rows))
 
     @on(Reader.Fitted, "#side")

@@ -78,6 +78,7 @@ _FALL_S = LIMITS.add("fall to the side that lost it", 1.2, "s", "a choice: then 
 _SWINGS_S = LIMITS.add(
     "time in which a swing comes back", 2.0, "s", "a choice: vehicles swing once a second and faster"
 )
+_ANSWERS_S = LIMITS.add("time to answer a new demand", 0.5, "s", "a choice: until then it is off it without a swing")
 _AT_LIMIT = LIMITS.add("output at its limit", 0.97, "of the range", "a choice: outputs are rounded")
 _LIMITED = LIMITS.add("critical share of the time at its limit", 0.2, "", "a choice: nothing is left to give")
 _FAR = LIMITS.add("critical excess, in limits", 4.0, "", "a choice")
@@ -351,11 +352,18 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
 
 def _swung_over(table: Table, lost: float, roll: float, pitch: float) -> bool:
     """Whether it was as far off its demand to the other side just before: the corner of a motor that gives nothing
-    sinks from the first, what swings goes to and fro."""
-    rows = (table.t >= lost - _SWINGS_S) & (table.t < lost - _LEANS_S)
-    off = (table["Roll"] - table["DesRoll"])[rows], (table["Pitch"] - table["DesPitch"])[rows]
-    towards = (roll * off[0] + pitch * off[1]) / np.hypot(roll, pitch)
-    return bool(len(towards)) and float(np.min(towards)) < -_TIPS_DEG
+    sinks from the first, what swings goes to and fro. A demand that has just leapt makes no swing."""
+    t = table.t
+    rows = (t >= lost - _SWINGS_S) & (t < lost - _LEANS_S)
+
+    def towards(asked: Floats) -> Floats:
+        """How far it is off what was asked for then, to the side to which it falls."""
+        off_roll = table["Roll"] - np.interp(asked, t, table["DesRoll"])
+        off_pitch = table["Pitch"] - np.interp(asked, t, table["DesPitch"])
+        return np.asarray((roll * off_roll + pitch * off_pitch)[rows] / np.hypot(roll, pitch))
+
+    swings = np.maximum(towards(t), towards(t - _ANSWERS_S))
+    return bool(len(swings)) and float(np.min(swings)) < -_TIPS_DEG
 
 
 def _driven_hardest(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
