@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from difflib import SequenceMatcher
 
+from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.generic import near, problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.scopes import Keys, Scoped, split
@@ -23,7 +24,6 @@ _PLANNERS = {
 }  # fmt: skip
 """Planners of move_base by the parameter that names one."""
 _CLASSES = "the plugin description files of the planners"
-_PARAMETERS = "ros__parameters"
 
 
 def check(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
@@ -38,8 +38,8 @@ def _parts(file: ConfigFile, ros: Ros) -> Iterator[Problem]:
     parts: dict[Keys, list[Entry]] = {}
     for entry in file.entries:
         keys = split(entry) if ros == "ros2" else entry.keys
-        end = keys.index(_PARAMETERS) if _PARAMETERS in keys[:-1] else len(keys) - 1
-        if end and (ros == "ros1" or _PARAMETERS in keys[:-1]):
+        end = keys.index(PARAMETERS) if PARAMETERS in keys[:-1] else len(keys) - 1
+        if end and (ros == "ros1" or PARAMETERS in keys[:-1]):
             parts.setdefault(keys[:end], []).append(entry)
     names = {keys[-1] for keys in parts}
     for keys, entries in parts.items():

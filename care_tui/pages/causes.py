@@ -231,10 +231,10 @@ class CausesPage(ProvenPage):
         figure = self.figure(finding.title, finding, self.height(first))
         return Rows([*first, *figure, *(() if self.is_wide else rows)])
 
-    def beside_title(self) -> str:
-        return "Path and fix"
+    def beside(self) -> tuple[str, list[Row]]:
+        return "Path and fix", self._path_and_fix()
 
-    def beside(self) -> list[Row]:
+    def _path_and_fix(self) -> list[Row]:
         """The path of a cause and what its change brings, or all about a finding."""
         here = self._here
         if here is None:

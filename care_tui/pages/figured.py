@@ -28,13 +28,10 @@ class FiguredPage(Page):
             yield Reader(self.glyphs, id="side")
         yield Reader(self.glyphs, id="text")
 
-    def beside_title(self) -> str:
-        """Title of the pane beside the figure."""
-        raise NotImplementedError
-
-    def beside(self) -> list[Row]:
-        """What stands beside the figure where there is room; nothing where the text says it all."""
-        raise NotImplementedError
+    def beside(self) -> tuple[str, list[Row]]:
+        """Title and text of the pane beside the figure where there is room; no text where the figure's pane says it
+        all."""
+        return "", []
 
     @property
     def is_wide(self) -> bool:
@@ -61,12 +58,12 @@ class FiguredPage(Page):
 
     def _show_side(self) -> None:
         side = self.query_one("#side", Reader)
-        rows = self.beside() if self.is_wide else []
+        title, rows = self.beside() if self.is_wide else ("", [])
         side.display = bool(rows)
         self.query_one("#left").display = self.choices.display or side.display  # else the text has the whole width
         if rows:
-            if side.border_title != self.beside_title():  # even the same title has the whole pane drawn
-                side.border_title = self.beside_title()
+            if side.border_title != title:  # even the same title has the whole pane drawn
+                side.border_title = title
             side.show(Rows(rows))
 
     @on(Reader.Fitted, "#side")

@@ -75,10 +75,7 @@ class FixPage(FiguredPage, DiagnosisPage):
             self.session.unchanged = answer
             self.post_message(Decided(has_changed_fix=False))
         if question == RESPONSE:
-            if self._weighed is not None:
-                self._responses[self._weighed] = answer if isinstance(answer, list) else []
-            self._weighed = None
-            self.show_text(from_top=False)
+            self._take_response(answer)
         else:
             super().take(question, answer)
 
@@ -98,10 +95,11 @@ class FixPage(FiguredPage, DiagnosisPage):
         index, session.option = self._place(options), None
         listing = Listing(len(options), item, lambda i: f"{options[i].name} {options[i].doc}")
         has_figure = self._has_figure(self.option_here())
-        about = "Odds of all objectives, by its value" if has_figure else self.beside_title()
+        about = "Odds of all objectives, by its value" if has_figure else self._about_prediction
         return View(self._title(), lambda i: self._detail(None if i is None else options[i]), listing, index, about)
 
-    def beside_title(self) -> str:
+    @property
+    def _about_prediction(self) -> str:
         return f"Predicted {'with what is ticked' if self.session.basket.ticked else 'as driven'} (80 % intervals)"
 
     def _place(self, options: list[Variable]) -> int | None:
@@ -120,9 +118,9 @@ class FixPage(FiguredPage, DiagnosisPage):
             return Rows(self._figure(option))
         return Rows(self._predicted(option))
 
-    def beside(self) -> list[Row]:
+    def beside(self) -> tuple[str, list[Row]]:
         option = self.option_here()
-        return self._predicted(option) if self._has_figure(option) else []
+        return self._about_prediction, self._predicted(option) if self._has_figure(option) else []
 
     def _predicted(self, option: Variable | None) -> list[Row]:
         """What is predicted of the ticked changes, and what has to be known of an option."""
@@ -171,6 +169,19 @@ class FixPage(FiguredPage, DiagnosisPage):
         marks[session.basket.ticked.get(option.name)] = "ticked"
         return tuple((value, what) for value, what in marks.items() if value is not None)
 
+    def _take_response(self, answer: object) -> None:
+        """Keep the odds under the option that they are of, which the cursor may have left; without an answer none."""
+        if isinstance(answer, tuple):
+            key, odds = answer
+        elif self._weighed is not None:
+            key, odds = self._weighed, []
+        else:
+            return
+        self._responses[key] = odds
+        if key == self._weighed:
+            self._weighed = None
+        self.show_text(from_top=False)
+
     def _weigh(self, option: Variable) -> None:
         """Have a thread ask for the odds of each value, and leave those of another option."""
         case, key, odds_over = self.session.case, self._key(option), self.workspace.engine.odds_over
@@ -178,13 +189,13 @@ class FixPage(FiguredPage, DiagnosisPage):
             return
         self._weighed = key
 
-        def work() -> list[Odds]:
+        def work() -> tuple[Key, list[Odds]]:
             worker, found = get_current_worker(), []
             for one in odds_over(case, option, dict(key[1])):
                 if worker.is_cancelled:
                     raise CancelledError
                 found.append(one)
-            return found
+            return key, found
 
         self.ask(RESPONSE, work)
 

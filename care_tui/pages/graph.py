@@ -105,14 +105,11 @@ class GraphPage(FiguredPage):
     def _variable(self, name: str) -> Variable | None:
         return self._case.schema.variables.get(name) if self._case.schema else None
 
-    def beside_title(self) -> str:
-        return "About"
-
-    def beside(self) -> list[Row]:
+    def beside(self) -> tuple[str, list[Row]]:
         index = self.index
         if index is None or not self._trail:
-            return []
-        return list(self._detail(self._trail[-1], self._links(self._trail[-1])[index]).rows)
+            return "About", []
+        return "About", list(self._detail(self._trail[-1], self._links(self._trail[-1])[index]).rows)
 
     @staticmethod
     def _counts(links: list[Link]) -> str:

@@ -107,15 +107,13 @@ class ObjectivesPage(ProvenPage):
         result = self.session.diagnosis.objectives[index]
         return self.has_figure(result.name, result)
 
-    def beside_title(self) -> str:
-        return JUDGED
-
-    def beside(self) -> list[Row]:
-        """How it was judged, beside the figure."""
+    def beside(self) -> tuple[str, list[Row]]:
         index = self.index
         if index is None or not self._has_figure(index):
-            return []
-        return self._judged(index, self.choices.room.width - 1)  # as wide as the list, but for the text's margin
+            return JUDGED, []
+        return JUDGED, self._judged(
+            index, self.choices.room.width - 1
+        )  # as wide as the list, but for the text's margin
 
     def moved(self, index: int) -> None:
         self.session.objective = index
