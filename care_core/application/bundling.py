@@ -14,9 +14,10 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from care_core.application.open_run import OpenRun, log_of
 from care_core.application.plotting import ranked, sources_of, thinned
+from care_core.application.redaction import ELSEWHERE, parameters_of, redactor_of
 from care_core.application.reporting import report_of
 from care_core.application.shared_parameters import may_go
-from care_core.application.sharing import ELSEWHERE, Sharing, parameters_of
+from care_core.application.sharing import Sharing
 from care_core.application.signals import Line, Source, lines_of
 from care_core.application.viewing import messages_of
 from care_core.errors import CareError
@@ -162,7 +163,7 @@ def _anonymous(case: OpenRun, settings: Mapping[str, Setting], sharing: Sharing)
 
 def _messages(case: OpenRun, sharing: Sharing) -> str:
     """What the robot's software said, in order of time, as CSV."""
-    hider = sharing.hider(case) if sharing.anonymous else None
+    hider = redactor_of(case, positions=sharing.positions) if sharing.anonymous else None
     text = hider.said if hider else sharing.text(case)
     try:
         messages = messages_of(case)

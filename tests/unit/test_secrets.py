@@ -13,8 +13,9 @@ import pytest
 import care_core
 from care_core.application.bundling import bundle_of
 from care_core.application.case import Case, Request
+from care_core.application.redaction import HIDDEN, LEFT_OUT, NO_PLACE, Redactor, redactor_of, without_places
 from care_core.application.shared_parameters import may_go
-from care_core.application.sharing import HIDDEN, LEFT_OUT, NO_PLACE, Redactor, Sharing, without_places
+from care_core.application.sharing import Sharing
 from care_core.files import bundled
 from tests.rewritten import write_text
 
@@ -61,7 +62,7 @@ USUAL = (
 
 @pytest.fixture(scope="module")
 def hider() -> Redactor:
-    return ANONYMOUS.hider(care_core.triage(SAMPLE))
+    return redactor_of(care_core.triage(SAMPLE), positions=ANONYMOUS.positions)
 
 
 @pytest.mark.parametrize("text", [*PLACES, *DAYS, *ADDRESSES, *SERIALS, *NAMES], ids=ascii)

@@ -12,7 +12,8 @@ import pytest
 import care_core
 from care_core.application.bundling import bundle_of
 from care_core.application.case import Case
-from care_core.application.sharing import HIDDEN, NO_PLACE, Redactor, Sharing, without_places
+from care_core.application.redaction import HIDDEN, NO_PLACE, Redactor, without_places
+from care_core.application.sharing import Sharing
 from care_core.files import bundled
 from care_core.report.formats import FORMATS
 from tests.goal_drives import drive
