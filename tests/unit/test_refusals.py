@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import pytest
 
 from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.ardupilot.texts import in_full, refusal_of
 from care_core.ecosystems.findings import Finding, every_finding
 from care_core.logs.base import Table
 from care_core.metadata import ardupilot
@@ -302,3 +303,18 @@ def test_a_check_that_takes_one_value_asks_for_it() -> None:
 def test_a_receiver_that_has_a_fix_is_of_the_right_type() -> None:
     assert refused("GPS 1: Bad fix", GPS_TYPE=(9, 1)).parameters == ()
     assert refused("GPS 2: Bad fix", GPS_TYPE2=(9, 1)).parameters == ("GPS_TYPE2",)
+
+
+def test_a_check_that_the_default_cannot_pass_names_it_without_a_value() -> None:
+    finding = refused("DO_LAND_START set and RTL_AUTOLAND disabled", RTL_AUTOLAND=(0, 0))
+    assert (finding.parameters, finding.wanted) == (("RTL_AUTOLAND",), ())
+    assert "RTL_AUTOLAND is 0 (default 0), must be above 0: check it first" in finding.evidence
+
+
+def test_a_refusal_that_is_cut_is_the_one_that_is_told_in_full() -> None:
+    """A status text holds 50 characters, of which "PreArm: " takes three more than "Arm: "."""
+    texts = ["Arm: DO_LAND_START set and RTL_AUTOLAND disabled", "PreArm: DO_LAND_START set and RTL_AUTOLAND disable"]
+    said = [one for t, text in enumerate(texts) if (one := refusal_of(float(t), text)) is not None]
+    assert {one.why for one in in_full(said)} == {"DO_LAND_START set and RTL_AUTOLAND disabled"}
+    short = [one for t, text in enumerate(["PreArm: GPS", "PreArm: GPS 1: Bad fix"]) if (one := refusal_of(t, text))]
+    assert {one.why for one in in_full(short)} == {"GPS", "GPS 1: Bad fix"}

@@ -18,8 +18,13 @@ NEEDED = READS["CMD"][:5]
 
 # Commands of MAVLink's common dialect (MAV_CMD).
 WAYPOINT, LOITER_TURNS, LOITER_TIME, RETURN, LAND, TAKEOFF, SPLINE = 16, 18, 19, 20, 21, 22, 82
+LOITER_FOREVER, LOITER_TO_HEIGHT = 17, 31
 DELAY, JUMP, CHANGE_SPEED, LAND_START = 93, 177, 178, 189
-PLACES = frozenset((WAYPOINT, LOITER_TURNS, LOITER_TIME, SPLINE))
+CIRCLES = frozenset((LOITER_FOREVER, LOITER_TURNS, LOITER_TIME, LOITER_TO_HEIGHT))
+"""What a plane flies circles for."""
+PLACES = frozenset((WAYPOINT, SPLINE, *CIRCLES))
+CURVES = frozenset((SPLINE, LOITER_TURNS))
+"""What a copter or a rover flies or drives no straight leg to."""
 HOLDS = frozenset((WAYPOINT, LOITER_TIME))
 _OF_QUADPLANES = {84: TAKEOFF, 85: LAND}
 """MAV_CMD_NAV_VTOL_TAKEOFF and _LAND: upright, but a take-off and a landing."""
@@ -58,7 +63,7 @@ class Item(Record):
 
     @property
     def is_waypoint(self) -> bool:
-        return self.command == WAYPOINT and (self.lat != 0 or self.lng != 0)
+        return self.command in (WAYPOINT, SPLINE) and (self.lat != 0 or self.lng != 0)
 
 
 class HeldMission(Record, eq=False):

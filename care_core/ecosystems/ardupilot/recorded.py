@@ -17,7 +17,7 @@ from care_core.ecosystems.ardupilot import held_missions
 from care_core.ecosystems.ardupilot.held_missions import HeldMission
 from care_core.ecosystems.ardupilot.instances import instances, sees_nothing
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded, recorded_as
-from care_core.ecosystems.ardupilot.texts import Refusal, refusal_of
+from care_core.ecosystems.ardupilot.texts import Refusal, in_full, refusal_of
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.plausible import sound as without_nonsense
 from care_core.ecosystems.vehicles import Kind, Vehicle, Way, mode_name, mode_number, vehicle_of, way_of
@@ -197,7 +197,7 @@ class Recorded(RunModel):
     def refusals(self) -> tuple[Refusal, ...]:
         """Every time that the firmware said why it cannot be armed."""
         said = (refusal_of(t, text) for t, text in self.messages)
-        return tuple(refusal for refusal in said if refusal is not None)
+        return in_full([refusal for refusal in said if refusal is not None])
 
     @cached_property
     def error_records(self) -> tuple[ErrorRecord, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 _ROUTINE = re.compile(
@@ -22,6 +23,8 @@ _ROUTINE = re.compile(
     re.VERBOSE,
 )
 _MISSION = re.compile(r"(?:Mission: (\d+) (.+)|(?:Reached (?:command|waypoint)|Passed waypoint) #(\d+))")
+_LONGEST_TEXT = 50
+"""Characters of a STATUSTEXT; what is longer is cut, or goes on in another."""
 _REFUSAL = re.compile(r"(?P<before>Pre)?Arm: (?P<why>.*)")
 RECORDED = {
     11: re.compile(r"GPS Glitch|Glitch cleared", re.IGNORECASE),
@@ -60,6 +63,15 @@ def refusal_of(time_s: float, text: str) -> Refusal | None:
     """The refusal of arming that a text is, None where it is none."""
     match = _REFUSAL.match(text)
     return None if match is None else Refusal(time_s, text, match["why"], match["before"] is None)
+
+
+def in_full(refusals: Sequence[Refusal]) -> tuple[Refusal, ...]:
+    """Refusals with what was cut of one told in full where another was not: "PreArm: " leaves three characters less
+    of a text than "Arm: " does."""
+    said = {one.why for one in refusals}
+    cut = {one.why for one in refusals if len(one.text) >= _LONGEST_TEXT}
+    longer = {why: max((other for other in said if other.startswith(why)), key=len) for why in cut}
+    return tuple(one._replace(why=longer.get(one.why, one.why)) for one in refusals)
 
 
 def says_what_is_recorded(text: str, subsystem: int) -> bool:

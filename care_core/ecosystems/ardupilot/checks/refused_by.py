@@ -120,7 +120,7 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
     broken = [one for one in reads.must if one.is_broken(values)]
     bound = {name: _held(flight, name, values[name]) for must in broken for name in must.parameters if name in values}
     named = [one for one in held if one.name in reads.named]
-    if proven := _at_fault(list(bound.values())):
+    if proven := _at_fault(list(bound.values())) or list(bound.values()):
         sure = PLAUSIBLE if is_outside else PROVEN
         for one in proven:
             only = next((value for must in broken if (value := must.value_of(one.name)) is not None), None)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot import armed, recorded
-from care_core.ecosystems.ardupilot.held_missions import LAND, RETURN
+from care_core.ecosystems.ardupilot.held_missions import CURVES, LAND, PLACES, RETURN, SPLINE, Item
 from care_core.ecosystems.ardupilot.measures.modes import flight_of, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import (
     ITEMS,
@@ -54,6 +54,8 @@ PASSED_M = 5.0
 """As near to a waypoint it was there: copters and rovers count one as reached within 2 m unless told otherwise."""
 
 _HOMEWARD = (RETURN, LAND)
+_LEADING = frozenset((*PLACES, *_HOMEWARD))
+"""Items that lead somewhere."""
 _WITHOUT_AIR = ("rover", "sub")
 _STARTED = re.compile(r"Mission: (\d+) ")
 _REACHED = re.compile(r"(?:Reached (?:command|waypoint)|Passed waypoint) #(\d+)")
@@ -102,6 +104,8 @@ class FlownMission(Record, eq=False):
     or broken off. None of one that flies."""
     completed: bool = False
     """Whether the vehicle said that its mission is complete, as rovers and submarines do."""
+    curved: tuple[Phase, ...] = ()
+    """Where it was on a spline, or on a circle and the leg from its edge: no straight leg says where it should be."""
 
     def under_way(self, t: Floats) -> NDArray[np.bool_]:
         """Whether the vehicle was on its way at times `t`: in its mission, or, where it flies, above `AIRBORNE_M`."""
@@ -120,6 +124,8 @@ class FlownMission(Record, eq=False):
             return np.empty(0)
         track = self.track.filled_in()
         going = self.under_way(track.t)
+        for start_s, end_s in self.curved:
+            going &= (track.t < start_s) | (track.t > end_s)
         points = np.column_stack((track.north[going], track.east[going]))
         return distance_to_legs(points, self.corners)
 
@@ -156,7 +162,23 @@ def analyse(mission: Mission) -> FlownMission:
         else _drive_phases(mission, drive, numbers, started, reached, complete_s),
         drive=drive,
         completed=complete_s is not None,
+        curved=_curved(items, started, mission.start_s, mission.end_s),
     )  # fmt: skip
+
+
+def _curved(items: Mapping[int, Item], started: Mapping[int, float], start_s: float, end_s: float) -> tuple[Phase, ...]:
+    """When no straight leg was flown: from the start of each such item to that of the next, after a circle to that of
+    the one after the next; all the time where no start is told."""
+    legs = sorted(started[number] for number in started if number in items and items[number].command in _LEADING)
+    curves = {number: 1 if item.command == SPLINE else 2 for number, item in items.items() if item.command in CURVES}
+    if curves and not legs:
+        return (Phase(start_s, end_s),)
+    found = []
+    for number, lasts in curves.items():
+        if number in started:
+            later = [t for t in legs if t > started[number]]
+            found.append(Phase(started[number], later[lasts - 1] if len(later) >= lasts else end_s))
+    return tuple(found)
 
 
 def _passed(

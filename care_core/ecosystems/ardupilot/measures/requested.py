@@ -19,6 +19,7 @@ from care_core.ecosystems.ardupilot.held_missions import (
     HOLDS,
     JUMP,
     LAND,
+    LOITER_TURNS,
     PLACES,
     RETURN,
     TAKEOFF,
@@ -52,6 +53,8 @@ _AIRSPEED, _GROUNDSPEED = 0, 1
 _ONE_MISSION = "judge a run whose mission stays as it was uploaded"
 _MOST_ITEMS = 2000
 """Items that are followed: a jump without end would never stop."""
+_CIRCLE_RATE = 20.0
+"""As shipped (AC_Circle.h)."""
 _HOME = 1
 """Type of an ORGN record: home; 0 is the origin of the estimator."""
 
@@ -69,14 +72,15 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     points, holds, speeds = [(0.0, 0.0, 0.0)], [], []
     speed = 0.0
     ending: Ending = "open"
+    turn_s = _turn_s(mission)
     for item in _followed(held.items):
         if item.command == TAKEOFF:
             points[0] = (0.0, 0.0, _height(item, home))
         elif item.command == CHANGE_SPEED and item.first in (_AIRSPEED, _GROUNDSPEED):
             speed = item.second if item.second > 0 else speed
         elif item.command in PLACES:
-            points.append(_place(item, home, points[-1]))
-            holds.append(max(item.first, 0.0) if item.command in HOLDS else 0.0)
+            points.append(place_of(item, home, points[-1]))
+            holds.append(_wait_s(item, turn_s))
             speeds.append(speed)
         elif item.command == DELAY and holds:
             holds[-1] += max(item.first, 0.0)
@@ -90,6 +94,22 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     if len(points) < 2:
         return Unavailable("the mission has no waypoints")
     return RequestedMission(np.array(points), np.array(holds), np.array(speeds), ending)
+
+
+def _wait_s(item: Item, turn_s: float) -> float:
+    """How long a vehicle stays where an item leads."""
+    if item.command == LOITER_TURNS:
+        return max(item.first, 0.0) * turn_s
+    return max(item.first, 0.0) if item.command in HOLDS else 0.0
+
+
+def _turn_s(mission: Mission) -> float:
+    """How long a copter takes for one circle, by `CIRCLE_RATE` in degrees a second; those of planes are measured by
+    their radius."""
+    if flight_of(mission).kind != "copter":
+        return 0.0
+    rate = mission.settings.get("CIRCLE_RATE", _CIRCLE_RATE)
+    return 360.0 / abs(rate) if isinstance(rate, (int, float)) and rate else 0.0
 
 
 def mission_held(mission: Mission) -> HeldMission | Unavailable:
@@ -157,7 +177,7 @@ def _height(item: Item, home: Sequence[float]) -> float:
     return item.alt_m - home[2] if item.frame in _ABOVE_SEA and home[2] else item.alt_m
 
 
-def _place(item: Item, home: Sequence[float], before: tuple[float, float, float]) -> tuple[float, float, float]:
+def place_of(item: Item, home: Sequence[float], before: tuple[float, float, float]) -> tuple[float, float, float]:
     """Where an item leads; coordinates or a height of 0 mean those of the item before."""
     north, east = offset_m(home, item.lat, item.lng) if item.lat or item.lng else before[:2]
     return north, east, _height(item, home) if item.alt_m else before[2]

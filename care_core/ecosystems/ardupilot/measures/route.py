@@ -122,4 +122,7 @@ def path_error(mission: Mission, args: Args) -> Value:
         return flown
     if flown.track is None or not len(flown.corners):
         return missing("POS" if flown.track is None else "CMD")
-    return statistic(flown.path_errors(), str(args.get("stat", "max")))
+    errors = flown.path_errors()
+    if flown.curved and not len(errors):
+        return Unavailable("the mission asks for curves alone, and no straight leg was flown")
+    return statistic(errors, str(args.get("stat", "max")))

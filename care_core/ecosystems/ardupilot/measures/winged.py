@@ -9,16 +9,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.held_missions import LAND, LAND_START, LOITER_TIME, LOITER_TURNS, RETURN
+from care_core.ecosystems.ardupilot.held_missions import (
+    CIRCLES,
+    LAND,
+    LAND_START,
+    LOITER_TURNS,
+    PLACES,
+    RETURN,
+    HeldMission,
+)
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse
 from care_core.ecosystems.ardupilot.measures.phases import flown_mission
-from care_core.ecosystems.ardupilot.measures.requested import ITEMS, mission_held, requested_mission
+from care_core.ecosystems.ardupilot.measures.requested import (
+    ITEMS,
+    home_of,
+    mission_held,
+    place_of,
+    requested_mission,
+)
 from care_core.ecosystems.ardupilot.measures.samples import samples
 from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS
 from care_core.ecosystems.coverage import EXTREME, USUAL, Samples, Span
@@ -35,7 +50,6 @@ Floats = NDArray[np.float64]
 _STAT = one_of("mean, max, min, rms or peak (95th percentile)", "mean", "max", "min", "rms", "peak")
 _FULL_DEFLECTION, _AT_LIMIT = 4500.0, 0.95
 """AETR of a surface that is out to its stop (SRV_Channel: -4500 to 4500)."""
-_CIRCLES = (LOITER_TURNS, LOITER_TIME)
 _LANDING = (RETURN, LAND, LAND_START)
 _STRAIGHT_DEG = 15.0
 """Legs on the final lead on within so much."""
@@ -44,6 +58,7 @@ _STEADY_DEG, _STEADY_MS = 15.0, 1.0
 _TOUCHDOWN_S = 4.0
 """The last seconds of a glide before the ground."""
 _GROUND_M, _CLIMBED_M = 3.0, 5.0
+_SAME_PLACE_M = 1.0
 _MIN_AIRSPEED = 5.0
 
 _AIRSPEED: Wanted = {"CTUN": ("As",), "NTUN": ("TAsp",)}
@@ -53,38 +68,91 @@ _CLIMB: Wanted = {"TECS": ("dh", "dhdem")}
 _WIND: Wanted = {"XKF2": ("C", "VWN", "VWE")}
 
 
-class Legs(Record, eq=False):
-    """The legs of a plane's mission that are judged."""
+class Corner(NamedTuple):
+    """A place that a mission leads to: north and east of home and above it, in metres."""
 
-    route: Floats
-    """Shape (waypoints, 2): north and east of home in metres, the first where the first leg begins that is judged."""
-    heights: Floats
-    """Shape (waypoints,): metres above home."""
-    after_loiter: bool
-    """Whether one of the legs begins on a circle, and so off its line."""
-    spans: dict[int, Span]
-    """When each was flown whole, by its place in `route`, from 1."""
+    north: float
+    east: float
+    height: float
+    is_circle: bool
+
+
+_HOME = Corner(0.0, 0.0, 0.0, is_circle=False)
+
+
+class Leg(NamedTuple):
+    """A leg that is judged, from where the item before it led to."""
+
+    start: Corner
+    end: Corner
+
+    @property
+    def length(self) -> float:
+        return math.hypot(self.end.north - self.start.north, self.end.east - self.start.east)
+
+    @property
+    def rise(self) -> float:
+        return self.end.height - self.start.height
+
+
+class Legs(Record, eq=False):
+    """The legs of a plane's mission that are judged: those to its waypoints but the first."""
+
+    corners: tuple[Corner, ...]
+    """Where the mission leads to up to the last of them, its circles too, without home."""
+    legs: Mapping[int, Leg]
+    """By the number of the waypoint among the waypoints, from 2."""
+    spans: Mapping[int, Span]
+    """When each that was flown whole was flown."""
+
+    @property
+    def after_loiter(self) -> bool:
+        """Whether one of the legs begins on a circle, and so off its line."""
+        return any(leg.start.is_circle for leg in self.legs.values())
+
+    @property
+    def way(self) -> Floats:
+        """Shape (corners + 1, 2): the way that was asked for, from home."""
+        return np.array([(0.0, 0.0), *((corner.north, corner.east) for corner in self.corners)])
 
 
 def legs_of(mission: Mission) -> Legs | Unavailable:
     """The legs between the waypoints before the landing; use through `mission.shared`."""
-    flown, held = mission.shared(analyse), mission.shared(mission_held)
-    if isinstance(held, Unavailable) or not len(flown.route):
+    flown, held, home = mission.shared(analyse), mission.shared(mission_held), home_of(mission)
+    if isinstance(held, Unavailable) or home is None or not len(flown.route):
         return held if isinstance(held, Unavailable) else missing("CMD")
-    before = min((number for number, item in held.items.items() if item.command in _LANDING), default=math.inf)
-    route = flown.route[: sum(number < before for number in held.waypoints)]
-    if flown.end is not None and held.items[max(held.items)].command == LAND:
-        route = route[: len(route) - _on_final(np.vstack((route, flown.end)))]
-    numbers = held.waypoints[: len(route)]
-    loiters = [number for number, item in held.items.items() if item.command in _CIRCLES]
-    circling = any(numbers[0] < number < numbers[-1] for number in loiters) if numbers else False
-    heights = np.array([waypoint.alt_m for waypoint in flown.waypoints[: len(route)]])
+    numbers = held.waypoints[: _before_landing(held, flown.route, flown.end)]
+    corners: list[Corner] = []
+    legs: dict[int, Leg] = {}
+    for number, corner in _corners(held, home):
+        if numbers and number <= numbers[-1]:
+            if number in numbers[1:]:
+                legs[numbers.index(number) + 1] = Leg(corners[-1], corner)
+            corners.append(corner)
     spans = {
-        number - 1: (phase.start_s, phase.end_s)
-        for (name, number), phase in flown.phases.items()
-        if name == "leg" and 1 < number <= len(route)
+        index: (phase.start_s, phase.end_s)
+        for (name, index), phase in flown.phases.items()
+        if name == "leg" and index in legs
     }
-    return Legs(route, heights, circling, spans)
+    return Legs(tuple(corners), legs, spans)
+
+
+def _before_landing(held: HeldMission, route: Floats, end: tuple[float, float] | None) -> int:
+    """How many of the waypoints come before the landing."""
+    landing = min((number for number, item in held.items.items() if item.command in _LANDING), default=math.inf)
+    count = sum(number < landing for number in held.waypoints)
+    if end is not None and held.items[max(held.items)].command == LAND:
+        count -= _on_final(np.vstack((route[:count], end)))
+    return max(count, 0)
+
+
+def _corners(held: HeldMission, home: Sequence[float]) -> Iterator[tuple[int, Corner]]:
+    """Where each item leads to, by its number."""
+    place = (0.0, 0.0, 0.0)
+    for number, item in held.items.items():
+        if item.command in PLACES:
+            place = place_of(item, home, place)
+            yield number, Corner(*place, item.command in CIRCLES)
 
 
 def _on_final(way: Floats) -> int:
@@ -233,8 +301,8 @@ def leg_error(mission: Mission, args: Args) -> Value:
     if not parts:
         return missing("POS")
     points = np.concatenate([np.column_stack((part.north, part.east)) for part in parts])
-    way = np.vstack((np.zeros(2), legs.route))  # corners are cut: a leg begins before the one to it ends
-    return statistic(distance_to_legs(points, way), str(args.get("stat", "max")))
+    # corners are cut: a leg begins before the one to it ends
+    return statistic(distance_to_legs(points, legs.way), str(args.get("stat", "max")))
 
 
 @extractor("leg_speed", needs=NEEDS, unit="m/s")
@@ -243,11 +311,10 @@ def leg_speed(mission: Mission, args: Args) -> Value:
     legs = mission.shared(legs_of)
     if isinstance(legs, Unavailable):
         return legs
-    lengths = np.hypot(*np.diff(legs.route, axis=0).T)
     flown_s = sum(end - start for start, end in legs.spans.values())
     if flown_s <= 0:
         return Unavailable("the flight completed no leg after the first")
-    return sum(float(lengths[number - 1]) for number in legs.spans) / flown_s
+    return sum(legs.legs[index].length for index in legs.spans) / flown_s
 
 
 def _controller(args: Args) -> str:
@@ -343,19 +410,30 @@ def sharpest_corner(mission: Mission, args: Args) -> Value:
     legs = mission.shared(legs_of)
     if isinstance(legs, Unavailable):
         return legs
-    return float(np.max(np.abs(_turn(np.diff(_courses(legs.route)))), initial=0.0))
+    corners = _apart((_HOME, *legs.corners))
+    turned = [
+        abs(float(_turn(np.diff(_courses(np.array([a[:2], b[:2], c[:2]])))[0])))
+        for a, b, c in zip(corners, corners[1:], corners[2:], strict=False)
+        if not b.is_circle
+    ]
+    return max(turned, default=0.0)
+
+
+def _apart(corners: Sequence[Corner]) -> list[Corner]:
+    """The corners without those at the place of the one before, as a circle around a waypoint is."""
+    kept = list(corners[:1])
+    for corner in corners[1:]:
+        if math.dist(corner[:2], kept[-1][:2]) > _SAME_PLACE_M:
+            kept.append(corner)
+    return kept
 
 
 _LEGS: Mapping[str, Callable[[Legs, float], float]] = {
-    "length": lambda legs, _start_m: float(np.hypot(*np.diff(legs.route, axis=0).T).sum()) if len(legs.route) else 0.0,
+    "length": lambda legs, _start_m: sum(leg.length for leg in legs.legs.values()),
     "after_loiter": lambda legs, _start_m: float(legs.after_loiter),
     "rises": lambda legs, start_m: (
-        float(
-            (np.maximum(np.diff(legs.heights), 0.0) ** 2).sum()
-            + _FIRST_CLIMB * max(float(legs.heights[0]) - start_m, 0.0) ** 2
-        )
-        if len(legs.heights)
-        else 0.0
+        sum(max(leg.rise, 0.0) ** 2 for leg in legs.legs.values())
+        + (_FIRST_CLIMB * max(legs.corners[0].height - start_m, 0.0) ** 2 if legs.corners else 0.0)
     ),
 }
 _FIRST_CLIMB = 0.5
