@@ -97,13 +97,45 @@ def flight(**replaced: Table | None) -> dict[str, Table]:
 SPEC: Mapping[str, Any] = {"waypoints": [[north(100), HOME[1], 20]], "tolerance_m": 5}
 
 
-def only(tables: Mapping[str, Table], **settings: float) -> Mission:
-    (mission,) = KIND.missions(*read(tables, 75.0), SPEC)
+def only(tables: Mapping[str, Table], firmware: str = "", **settings: float) -> Mission:
+    (mission,) = KIND.missions(*read(tables, 75.0, facts={"firmware": firmware}), SPEC)
     return Mission(mission.model, mission.tables, mission.start_s, mission.end_s, mission.ended, mission.spec, settings)
 
 
 def value(mission: Mission, kind: str, **args: Any) -> Value:
     return find_extractor(kind).compute(mission, args)
+
+
+def curved(command: int, turns: float = 0.0) -> dict[str, Table]:
+    """The flight with another kind of item in the waypoint's place, flown with a swing of 12 m to the north-east."""
+    tables = flight()
+    items = tables["CMD"]
+    columns = (items[name] for name in ("CNum", "CId", "Lat", "Lng", "Alt"))
+    rows = [
+        (t, number, command if kind == 16 else kind, lat, lng, alt, turns)
+        for t, number, kind, lat, lng, alt in zip(items.t, *columns, strict=True)
+    ]
+    position = tables["POS"]
+    swing = 12.0 * ((position.t > 22.0) & (position.t < 28.0))
+    return {
+        **tables,
+        "CMD": table(rows, "CNum", "CId", "Lat", "Lng", "Alt", "Prm1"),
+        "POS": Table(position.t, {**position.columns, "Lng": position["Lng"] + swing / METRES}),
+    }
+
+
+def test_a_spline_has_no_straight_leg_to_be_off_from() -> None:
+    straight, spline = only(curved(16)), only(curved(82))
+    assert value(straight, "path_error") > 5.0
+    assert value(spline, "path_error") == pytest.approx(0.25, abs=0.25)
+    assert value(spline, "waypoints_reached") == 1.0
+
+
+def test_a_circle_takes_its_time_and_is_no_error_of_the_way() -> None:
+    tables, copter = curved(18, turns=2), "ArduCopter V4.5.4"
+    assert value(only(tables, copter, CIRCLE_RATE=30.0), "mission_asked", what="hold_time") == pytest.approx(24.0)
+    assert value(only(tables, copter), "mission_asked", what="hold_time") == pytest.approx(36.0)
+    assert value(only(tables, copter), "path_error") == pytest.approx(0.25, abs=0.25)
 
 
 def test_a_good_flight() -> None:

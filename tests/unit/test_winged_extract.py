@@ -88,8 +88,25 @@ def value(kind: str, /, flight: Mission | None = None, **args: Any) -> Value:
 def test_the_straight_final_and_the_first_leg_are_not_judged() -> None:
     legs = winged.legs_of(mission())
     assert not isinstance(legs, Unavailable)
-    assert len(legs.route) == 3
-    assert legs.spans == {1: (25.0, 40.0), 2: (40.0, 55.0)}
+    assert [leg.length for leg in legs.legs.values()] == pytest.approx([300.0, 300.0], abs=0.1)
+    assert legs.spans == {2: (25.0, 40.0), 3: (40.0, 55.0)}
+
+
+def test_a_leg_begins_where_the_circle_before_it_is() -> None:
+    """The circle of item 3 stands 200 m beside the line between the waypoints around it."""
+    tables = flown()
+    command = tables["CMD"].columns
+    circle, waypoint = command["CNum"] == 3, command["CNum"] == 2
+    command["CId"][circle] = 19
+    command["Lat"][circle] = command["Lat"][waypoint] + 200.0 / METRES
+    command["Lng"][circle] = command["Lng"][waypoint]
+    flight = mission(CMD=tables["CMD"])
+    legs = winged.legs_of(flight)
+    assert not isinstance(legs, Unavailable)
+    assert legs.after_loiter
+    (leg,) = legs.legs.values()
+    assert (leg.start.is_circle, leg.length) == (True, pytest.approx(math.hypot(500.0, 300.0), abs=0.1))
+    assert value("sharpest_corner", flight) == pytest.approx(0.0, abs=0.1), "a plane leaves a circle in any direction"
 
 
 def test_a_waypoint_that_was_passed_counts() -> None:
