@@ -344,7 +344,7 @@ def drive_full_throttle_speed(given: Given) -> FloatArray:
 
 # --- planes: legs at an airspeed, circles, a landing ------------------------------------------------------------
 
-_PLANE = ("speed", "least_speed", "most_speed")
+_PLANE = ("speed", "least_speed", "most_speed", "commanded_speed")
 _PLANE_MISSION = (*_PLANE, "path_length", "loiter_turns", "loiter_radius", "hold_time", "returns", "return_distance")
 _PLANE_ENDS_S = 30.0
 """Take-off run, flare, roll-out and disarming."""
@@ -352,8 +352,10 @@ _PLANE_ENDS_S = 30.0
 
 @formula(*_PLANE)
 def plane_airspeed(given: Given) -> FloatArray:
-    """The airspeed that is asked for: no less than the least, no more than the largest."""
-    return np.asarray(np.maximum(np.minimum(given["speed"], given["most_speed"]), given["least_speed"]))
+    """The airspeed that is asked for, by the mission or else the parameter: no less than the least, no more than the
+    largest."""
+    wanted = np.where(given["commanded_speed"] > 0, given["commanded_speed"], given["speed"])
+    return np.asarray(np.maximum(np.minimum(wanted, given["most_speed"]), given["least_speed"]))
 
 
 @formula(*_PLANE_MISSION)
