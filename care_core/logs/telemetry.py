@@ -283,20 +283,20 @@ def _items(log: _Telemetry) -> Table | None:
     rows: list[Sample] = []
     for message, scale in (("MISSION_ITEM_INT", 1e-7), ("MISSION_ITEM", 1.0)):
         for table in log.exchanged(
-            message, "seq", "command", "param1", "param2", "x", "y", "z", "frame", "mission_type"
+            message, "seq", "command", "param1", "param2", "param3", "x", "y", "z", "frame", "mission_type"
         ).values():
             own = table.where((table["mission_type"] == 0) & (table["seq"] > 0))
             columns = (
-                own["seq"], own["command"], own["param1"], own["param2"], own["x"] * scale, own["y"] * scale, own["z"],
-                own["frame"], np.full(len(own), np.nan),
+                own["seq"], own["command"], own["param1"], own["param2"], own["param3"], own["x"] * scale,
+                own["y"] * scale, own["z"], own["frame"], np.full(len(own), np.nan),
             )  # fmt: skip
             rows += zip(own.t.tolist(), zip(*(column.tolist() for column in columns), strict=True), strict=True)
-    blank = (0.0,) * 8
+    blank = (0.0,) * 9
     announced = sorted(_counts(log))
     if announced and announced[0][-1] and announced[0][0] <= min((t for t, _ in rows), default=np.inf):
         rows.append((0.0, (*blank, 0.0)))  # what was held before the first upload is not known
     rows += [(t, (*blank, count)) for t, count, _ in announced]
-    return _to_table(rows, ("CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame", "CTot"))
+    return _to_table(rows, ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Lat", "Lng", "Alt", "Frame", "CTot"))
 
 
 def _counts(log: _Telemetry) -> Iterator[tuple[float, float, bool]]:

@@ -141,7 +141,7 @@ class Link:
         rows = upload(t, *metres)
         self.send(f"MISSION_COUNT{station}", t, count=len(rows), mission_type=kind)
         for at, (_, number, command, lat, height) in enumerate(rows):
-            item = dict.fromkeys(("param1", "param2"), 0.0) | {"frame": 3.0, "mission_type": kind}
+            item = dict.fromkeys(("param1", "param2", "param3"), 0.0) | {"frame": 3.0, "mission_type": kind}
             item |= {"seq": number, "command": command, "x": lat * 1e7, "y": HOME[1] * 1e7 if lat else 0.0, "z": height}
             if station:
                 self.send("MISSION_REQUEST_INT", t + 0.1 + at * 0.1, seq=number)

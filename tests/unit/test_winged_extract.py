@@ -103,9 +103,9 @@ def test_a_leg_begins_where_the_circle_before_it_is() -> None:
     flight = mission(CMD=tables["CMD"])
     legs = winged.legs_of(flight)
     assert not isinstance(legs, Unavailable)
-    assert legs.after_loiter
+    assert legs.after_loiter == 1.0
     (leg,) = legs.legs.values()
-    assert leg.start.is_circle
+    assert leg.start.circle == 1.0
     assert leg.length == pytest.approx(math.hypot(500.0, 300.0), abs=0.1)
     assert value("sharpest_corner", flight) == pytest.approx(0.0, abs=0.1), "a plane leaves a circle in any direction"
 
@@ -198,3 +198,12 @@ def test_a_mission_that_a_vehicle_would_not_begin_failed() -> None:
     dive = mission("ArduSub V4.5.0", MSG=table(rows, "Message"), MODE=table([(0.0, 19)], "ModeNum"))
     assert value("mission_success", dive) == 0.0
     assert value("no_mission", dive) == 1.0
+
+
+def test_a_circle_of_its_own_radius_is_no_circle_of_the_parameter() -> None:
+    items = flown()["CMD"]
+    own = np.where(items["CId"] == 18, 120.0, 0.0)
+    flight = mission(CMD=Table(items.t, {**items.columns, "Prm3": own}))
+    assert value("loiter_turns", flight) == 0.0
+    assert value("legs_asked", flight, what="after_loiter") == 0.0, "the leg from it is on the final"
+    assert value("mission_asked", flight, what="hold_time") == pytest.approx(2 * math.tau * 120.0 / 12.0)

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record, Struct
 
-READS: Wanted = {"CMD": ("CNum", "CId", "Lat", "Lng", "Alt", "Prm1", "Prm2", "Frame", "CTot")}
+READS: Wanted = {"CMD": ("CNum", "CId", "Lat", "Lng", "Alt", "Prm1", "Prm2", "Prm3", "Frame", "CTot")}
 """What is read of missions; the first five fields are needed."""
 NEEDED = READS["CMD"][:5]
 
@@ -36,11 +36,12 @@ _SAME_DEG, _SAME_M, _SAME_PARAMETER = 5e-5, 1.0, 0.5
 
 
 class Item(Record):
-    """One mission item: command, its first two parameters, place in degrees, height in metres and its frame."""
+    """One mission item: command, its first three parameters, place in degrees, height in metres and its frame."""
 
     command: int
     first: float
     second: float
+    third: float
     lat: float
     lng: float
     alt_m: float
@@ -60,6 +61,12 @@ class Item(Record):
             return self.command != TAKEOFF or abs(self.alt_m - other.alt_m) <= _SAME_M
         off_deg = max(abs(self.lat - other.lat), abs(self.lng - other.lng))
         return off_deg <= _SAME_DEG and abs(self.alt_m - other.alt_m) <= _SAME_M
+
+    @property
+    def radius_m(self) -> float:
+        """Of the circles that it asks for, 0 where the vehicle's own parameter rules."""
+        radius = {LOITER_TURNS: self.third, LOITER_FOREVER: self.third, LOITER_TO_HEIGHT: self.second}
+        return abs(radius.get(self.command, 0.0))
 
     @property
     def is_waypoint(self) -> bool:
@@ -126,16 +133,17 @@ def held_missions(table: Table | None) -> tuple[HeldMission, ...]:
 def _records(table: Table) -> Iterator[tuple[float, int, Item, int | None]]:
     """Time, number, item, and how many there are."""
     blank = [0.0] * len(table)
-    names = ("CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame")
+    names = ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Lat", "Lng", "Alt", "Frame")
     columns = [table[name].tolist() if name in table.columns else blank for name in names]
     counts = table["CTot"].tolist() if "CTot" in table.columns else [math.nan] * len(table)
     for t, count, row in zip(table.t.tolist(), counts, zip(*columns, strict=True), strict=True):
-        number, command, first, second, lat, lng, alt, frame = row
+        number, command, first, second, third, lat, lng, alt, frame = row
         if math.isfinite(number) and math.isfinite(command):
             item = Item(
                 _OF_QUADPLANES.get(int(command), int(command)),
                 first,
                 second,
+                third if math.isfinite(third) else 0.0,
                 lat,
                 lng,
                 alt,

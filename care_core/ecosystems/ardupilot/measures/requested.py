@@ -6,6 +6,7 @@ before the flight, so a vehicle that never armed has it too.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -53,8 +54,8 @@ _AIRSPEED, _GROUNDSPEED = 0, 1
 _ONE_MISSION = "judge a run whose mission stays as it was uploaded"
 _MOST_ITEMS = 2000
 """Items that are followed: a jump without end would never stop."""
-_CIRCLE_RATE = 20.0
-"""As shipped (AC_Circle.h)."""
+_CIRCLE_RATE, _AIRSPEED_MS = 20.0, 12.0
+"""As shipped (AC_Circle.h, ArduPlane/config.h)."""
 _HOME = 1
 """Type of an ORGN record: home; 0 is the origin of the estimator."""
 
@@ -72,7 +73,7 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     points, holds, speeds = [(0.0, 0.0, 0.0)], [], []
     speed = 0.0
     ending: Ending = "open"
-    turn_s = _turn_s(mission)
+    circle_s, airspeed_ms = _circle_s(mission), _airspeed_ms(mission)
     for item in _followed(held.items):
         if item.command == TAKEOFF:
             points[0] = (0.0, 0.0, _height(item, home))
@@ -80,7 +81,7 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
             speed = item.second if item.second > 0 else speed
         elif item.command in PLACES:
             points.append(place_of(item, home, points[-1]))
-            holds.append(_wait_s(item, turn_s))
+            holds.append(_wait_s(item, circle_s, speed or airspeed_ms))
             speeds.append(speed)
         elif item.command == DELAY and holds:
             holds[-1] += max(item.first, 0.0)
@@ -96,20 +97,31 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     return RequestedMission(np.array(points), np.array(holds), np.array(speeds), ending)
 
 
-def _wait_s(item: Item, turn_s: float) -> float:
-    """How long a vehicle stays where an item leads."""
+def _wait_s(item: Item, circle_s: float, airspeed_ms: float) -> float:
+    """How long a vehicle stays where an item leads, a plane as long as it flies circles whose radius the mission gives:
+    the others are flown with WP_LOITER_RAD, and are not waits."""
     if item.command == LOITER_TURNS:
-        return max(item.first, 0.0) * turn_s
+        return max(item.first, 0.0) * (circle_s or math.tau * item.radius_m / airspeed_ms)
     return max(item.first, 0.0) if item.command in HOLDS else 0.0
 
 
-def _turn_s(mission: Mission) -> float:
-    """How long a copter takes for one circle, by `CIRCLE_RATE` in degrees a second; those of planes are measured by
-    their radius."""
+def _circle_s(mission: Mission) -> float:
+    """How long a copter takes for one circle, by CIRCLE_RATE in degrees a second; 0 of others."""
     if flight_of(mission).kind != "copter":
         return 0.0
-    rate = mission.settings.get("CIRCLE_RATE", _CIRCLE_RATE)
-    return 360.0 / abs(rate) if isinstance(rate, (int, float)) and rate else 0.0
+    rate = _setting(mission, "CIRCLE_RATE", _CIRCLE_RATE)
+    return 360.0 / abs(rate) if rate else 0.0
+
+
+def _airspeed_ms(mission: Mission) -> float:
+    """The airspeed at which a plane flies that is not told otherwise."""
+    older = _setting(mission, "TRIM_ARSPD_CM", _AIRSPEED_MS * 100.0) / 100.0
+    return max(_setting(mission, "AIRSPEED_CRUISE", older), 1.0)
+
+
+def _setting(mission: Mission, name: str, default: float) -> float:
+    value = mission.settings.get(name, default)
+    return float(value) if isinstance(value, (int, float)) else default
 
 
 def mission_held(mission: Mission) -> HeldMission | Unavailable:

@@ -59,6 +59,8 @@ _TOUCHDOWN_S = 4.0
 """The last seconds of a glide before the ground."""
 _GROUND_M, _CLIMBED_M = 3.0, 5.0
 _SAME_PLACE_M = 1.0
+_LOITER_RADIUS_M = 60.0
+"""As shipped (ArduPlane/config.h)."""
 _MIN_AIRSPEED = 5.0
 
 _AIRSPEED: Wanted = {"CTUN": ("As",), "NTUN": ("TAsp",)}
@@ -74,10 +76,11 @@ class Corner(NamedTuple):
     north: float
     east: float
     height: float
-    is_circle: bool
+    circle: float | None = None
+    """Of a circle its radius as a share of WP_LOITER_RAD; None of a waypoint."""
 
 
-_HOME = Corner(0.0, 0.0, 0.0, is_circle=False)
+_HOME = Corner(0.0, 0.0, 0.0)
 
 
 class Leg(NamedTuple):
@@ -106,9 +109,9 @@ class Legs(Record, eq=False):
     """When each that was flown whole was flown."""
 
     @property
-    def after_loiter(self) -> bool:
-        """Whether one of the legs begins on a circle, and so off its line."""
-        return any(leg.start.is_circle for leg in self.legs.values())
+    def after_loiter(self) -> float:
+        """The widest circle that one of the legs begins on, and so off its line; 0 where none does."""
+        return max((leg.start.circle or 0.0 for leg in self.legs.values()), default=0.0)
 
     @property
     def way(self) -> Floats:
@@ -124,7 +127,7 @@ def legs_of(mission: Mission) -> Legs | Unavailable:
     numbers = held.waypoints[: _before_landing(held, flown.route, flown.end)]
     corners: list[Corner] = []
     legs: dict[int, Leg] = {}
-    for number, corner in _corners(held, home):
+    for number, corner in _corners(held, home, _limit(mission, "WP_LOITER_RAD", _LOITER_RADIUS_M)):
         if numbers and number <= numbers[-1]:
             if number in numbers[1:]:
                 legs[numbers.index(number) + 1] = Leg(corners[-1], corner)
@@ -146,13 +149,14 @@ def _before_landing(held: HeldMission, route: Floats, end: tuple[float, float] |
     return max(count, 0)
 
 
-def _corners(held: HeldMission, home: Sequence[float]) -> Iterator[tuple[int, Corner]]:
-    """Where each item leads to, by its number."""
+def _corners(held: HeldMission, home: Sequence[float], radius_m: float) -> Iterator[tuple[int, Corner]]:
+    """Where each item leads to, by its number; `radius_m` is that of circles for which the mission gives none."""
     place = (0.0, 0.0, 0.0)
     for number, item in held.items.items():
         if item.command in PLACES:
             place = place_of(item, home, place)
-            yield number, Corner(*place, item.command in CIRCLES)
+            own = item.radius_m / max(abs(radius_m), 1.0) if item.radius_m else 1.0
+            yield number, Corner(*place, own if item.command in CIRCLES else None)
 
 
 def _on_final(way: Floats) -> int:
@@ -397,11 +401,12 @@ def never_climbed(mission: Mission, args: Args) -> Value:
 
 @extractor("loiter_turns", needs=ITEMS, unit="")
 def loiter_turns(mission: Mission, args: Args) -> Value:
-    """How many circles a mission asks a plane to fly."""
+    """How many circles of WP_LOITER_RAD a mission asks a plane to fly; others are waits."""
     held = mission.shared(mission_held)
     if isinstance(held, Unavailable):
         return held
-    return float(sum(max(item.first, 0.0) for item in held.items.values() if item.command == LOITER_TURNS))
+    asked = (item for item in held.items.values() if item.command == LOITER_TURNS and not item.radius_m)
+    return float(sum(max(item.first, 0.0) for item in asked))
 
 
 @extractor("sharpest_corner", needs=NEEDS, unit="deg")
@@ -414,7 +419,7 @@ def sharpest_corner(mission: Mission, args: Args) -> Value:
     turned = [
         abs(float(_turn(np.diff(_courses(np.array([a[:2], b[:2], c[:2]])))[0])))
         for a, b, c in zip(corners, corners[1:], corners[2:], strict=False)
-        if not b.is_circle
+        if b.circle is None
     ]
     return max(turned, default=0.0)
 
@@ -430,7 +435,7 @@ def _apart(corners: Sequence[Corner]) -> list[Corner]:
 
 _LEGS: Mapping[str, Callable[[Legs, float], float]] = {
     "length": lambda legs, _start_m: sum(leg.length for leg in legs.legs.values()),
-    "after_loiter": lambda legs, _start_m: float(legs.after_loiter),
+    "after_loiter": lambda legs, _start_m: legs.after_loiter,
     "rises": lambda legs, start_m: (
         sum(max(leg.rise, 0.0) ** 2 for leg in legs.legs.values())
         + (_FIRST_CLIMB * max(legs.corners[0].height - start_m, 0.0) ** 2 if legs.corners else 0.0)
@@ -442,8 +447,8 @@ _FIRST_CLIMB = 0.5
 
 @extractor("legs_asked", needs=NEEDS, unit="", args={"what": one_of(", ".join(_LEGS), *_LEGS)})
 def legs_asked(mission: Mission, args: Args) -> Value:
-    """One number of the legs of a plane's mission that are judged: their `length` in m, whether one begins
-    `after_loiter`, the squares of what they lead up, `rises` in m^2."""
+    """One number of the legs of a plane's mission that are judged: their `length` in m, the widest circle that one
+    begins on as a share of WP_LOITER_RAD (`after_loiter`), the squares of what they lead up, `rises` in m^2."""
     legs, asked = mission.shared(legs_of), mission.shared(requested_mission)
     if isinstance(legs, Unavailable):
         return legs
