@@ -169,3 +169,13 @@ def test_corners_of_what_was_asked() -> None:
     mission = only(drive())
     assert value(mission, "mission_asked", what="sharp_turns") == pytest.approx(90.0)
     assert value(mission, "mission_asked", what="sharp_corners") == 0.0  # it waits there
+
+
+def test_the_way_home_of_a_rover_is_a_leg_like_any() -> None:
+    items = drive()["CMD"]
+    home = table([(0.0, 3, 20, 0.0, 0.0, 0.0, 0.0)], "CNum", "CId", "Prm1", "Lat", "Lng", "Alt")
+    columns = {name: np.append(items[name], home[name]) for name in items.columns}
+    returns = only(drive(CMD=Table(np.append(items.t, home.t), columns)))
+    assert value(only(drive()), "mission_asked", what="path_length") == pytest.approx(160.0, abs=0.1)
+    assert value(returns, "mission_asked", what="path_length") == pytest.approx(160.0 + math.hypot(100, 60), abs=0.1)
+    assert value(returns, "mission_asked", what="legs") == 3.0

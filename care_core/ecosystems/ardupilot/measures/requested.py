@@ -86,8 +86,8 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
         elif item.command == DELAY and holds:
             holds[-1] += max(item.first, 0.0)
         elif item.command in (RETURN, LAND):
-            if item.command == LAND and (item.lat or item.lng):
-                points.append((*offset_m(home, item.lat, item.lng), points[-1][2]))
+            if last := _last_place(item, home, points[-1], drives=flight_of(mission).kind == "rover"):
+                points.append(last)
                 holds.append(0.0)
                 speeds.append(speed)
             ending = "return" if item.command == RETURN else "land"
@@ -95,6 +95,16 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     if len(points) < 2:
         return Unavailable("the mission has no waypoints")
     return RequestedMission(np.array(points), np.array(holds), np.array(speeds), ending)
+
+
+def _last_place(
+    item: Item, home: Sequence[float], before: tuple[float, float, float], *, drives: bool
+) -> tuple[float, float, float] | None:
+    """Where the leg of a return or of a landing leads. A rover drives home as it drives any leg; the way home of what
+    flies has its own heights and speeds, and is no leg."""
+    if item.command == RETURN:
+        return (0.0, 0.0, 0.0) if drives else None
+    return (*offset_m(home, item.lat, item.lng), before[2]) if item.lat or item.lng else None
 
 
 def _wait_s(item: Item, circle_s: float, airspeed_ms: float) -> float:
