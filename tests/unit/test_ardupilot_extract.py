@@ -124,9 +124,34 @@ def curved(command: int, turns: float = 0.0) -> dict[str, Table]:
     }
 
 
+def test_a_landing_ends_the_flight_that_a_mission_asks_for() -> None:
+    """Behind it stands what the vehicle flies when it is armed again."""
+    tables = flight()
+    rows = [
+        (0.0, 1, 22, 0.0, 0.0, 20.0),
+        (0.0, 2, 16, north(100), HOME[1], 20.0),
+        (0.0, 3, 21, north(0), HOME[1], 0.0),
+        (0.0, 4, 22, 0.0, 0.0, 20.0),
+        (0.0, 5, 16, north(200), HOME[1], 20.0),
+        (0.0, 6, 20, 0.0, 0.0, 0.0),
+    ]
+    items = table(rows, "CNum", "CId", "Lat", "Lng", "Alt")
+    first = only({**tables, "CMD": items})
+    assert value(first, "waypoints_reached") == 1.0
+    assert value(first, "mission_success") == 1.0
+    said = [(20.0, "Mission: 5 WP"), (30.0, "Reached command #5"), (30.0, "Mission: 6 RTL")]
+    second = only({**tables, "CMD": items, "MSG": table(said, "Message")})
+    assert value(second, "mission_success") == 1.0
+    asked = value(second, "mission_asked", what="path_length")
+    assert isinstance(asked, Unavailable)
+    assert "behind a landing" in asked.reason
+    on = [(20.0, "Mission: 2 WP"), (30.0, "Reached command #2"), (30.0, "Mission: 3 Land"), (40.0, "Mission: 5 WP")]
+    assert value(only({**tables, "CMD": items, "MSG": table(on, "Message")}), "mission_success") == 0.0
+
+
 def test_a_spline_has_no_straight_leg_to_be_off_from() -> None:
     straight, spline = only(curved(16)), only(curved(82))
-    assert value(straight, "path_error") == pytest.approx(12.0, abs=1.0)
+    assert value(straight, "path_error") == pytest.approx(11.0, abs=1.0)
     assert value(spline, "path_error") == pytest.approx(0.25, abs=0.25)
     assert value(spline, "waypoints_reached") == 1.0
 

@@ -7,7 +7,7 @@ What differs from what was known of an item, or another number of items, is ther
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record, Struct
@@ -85,6 +85,15 @@ class HeldMission(Record, eq=False):
     def waypoints(self) -> list[int]:
         """Numbers of the waypoints."""
         return [number for number, item in self.items.items() if item.is_waypoint]
+
+    def flight(self, begun: Collection[int]) -> list[int]:
+        """Numbers of the items of one flight, of which it began these: a landing ends it, and what stands behind one is
+        the next flight's, unless this one went on with it."""
+        landings = [number for number, item in self.items.items() if item.command == LAND]
+        first, last = min(begun, default=0), max(begun, default=0)
+        start = max((number for number in landings if number < first), default=0)
+        end = min((number for number in landings if number >= last), default=math.inf)
+        return [number for number in self.items if start < number <= end]
 
     @property
     def lacks(self) -> int:

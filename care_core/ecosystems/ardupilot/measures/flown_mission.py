@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot import armed, recorded
-from care_core.ecosystems.ardupilot.held_missions import CURVES, LAND, PLACES, RETURN, SPLINE, Item
+from care_core.ecosystems.ardupilot.held_missions import CURVES, LAND, PLACES, RETURN, SPLINE, HeldMission, Item
 from care_core.ecosystems.ardupilot.measures.modes import flight_of, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import (
     ITEMS,
     home_of,
+    items_begun,
     mission_held,
     requested_mission,
 )
@@ -133,7 +134,7 @@ class FlownMission(Record, eq=False):
 def analyse(mission: Mission) -> FlownMission:
     """Works out what was flown of a mission; use through `mission.shared`."""
     held = mission.shared(mission_held)
-    items, numbers = ({}, []) if isinstance(held, Unavailable) else (held.items, held.waypoints)
+    items, numbers = ({}, []) if isinstance(held, Unavailable) else (held.items, _asked(mission, held))
     waypoints = tuple(Waypoint(items[n].lat, items[n].lng, items[n].alt_m) for n in numbers)
     home = home_of(mission)
     track = _track(mission, home)
@@ -179,6 +180,12 @@ def _curved(items: Mapping[int, Item], started: Mapping[int, float], start_s: fl
             later = [t for t in legs if t > started[number]]
             found.append(Phase(started[number], later[lasts - 1] if len(later) >= lasts else end_s))
     return tuple(found)
+
+
+def _asked(mission: Mission, held: HeldMission) -> list[int]:
+    """The waypoints that this flight was to reach."""
+    own = set(held.flight(items_begun(mission)))
+    return [number for number in held.waypoints if number in own]
 
 
 def _passed(

@@ -70,6 +70,8 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     home = home_of(mission)
     if home is None:
         return Unavailable("the log does not say where home is", "record ORGN or POS")
+    if min(held.items) not in held.flight(items_begun(mission)):
+        return Unavailable("the flight goes on with a mission behind a landing", _ONE_MISSION)
     points, holds, speeds = [(0.0, 0.0, 0.0)], [], []
     speed = 0.0
     ending: Ending = "open"
@@ -95,6 +97,12 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     if len(points) < 2:
         return Unavailable("the mission has no waypoints")
     return RequestedMission(np.array(points), np.array(holds), np.array(speeds), ending)
+
+
+def items_begun(mission: Mission) -> set[int]:
+    """Numbers of the items that the vehicle said it began."""
+    told = (mission_item(text) for _, text in flight_of(mission).messages_between(mission.start_s, mission.end_s))
+    return {item[0] for item in told if item is not None and item[1] != "reached"}
 
 
 def _last_place(
