@@ -207,3 +207,13 @@ def test_a_circle_of_its_own_radius_is_no_circle_of_the_parameter() -> None:
     assert value("loiter_turns", flight) == 0.0
     assert value("legs_asked", flight, what="after_loiter") == 0.0, "the leg from it is on the final"
     assert value("mission_asked", flight, what="hold_time") == pytest.approx(2 * math.tau * 120.0 / 12.0)
+
+
+@pytest.mark.parametrize(("what", "expected"), [(0, 27.0), (1, 0.0)], ids=["airspeed", "ground speed"])
+def test_an_airspeed_that_is_commanded_counts_and_a_ground_speed_does_not(what: int, expected: float) -> None:
+    items = flown()["CMD"]
+    added = {"CNum": 1.5, "CId": 178.0, "Prm1": float(what), "Prm2": 27.0, "Lat": 0.0, "Lng": 0.0, "Alt": 0.0}
+    columns = {name: np.insert(items[name], 2, added[name]) for name in items.columns}
+    columns["CNum"] = np.arange(len(columns["CNum"]), dtype=float)
+    flight = mission(CMD=Table(np.zeros(len(columns["CNum"])), columns))
+    assert value("mission_asked", flight, what="commanded_speed") == expected

@@ -51,6 +51,7 @@ ITEMS: Wanted = {
 _ABOVE_SEA = (0, 5)
 """MAV_FRAME of a height above sea level; the others count from home (3, 6) or from the terrain (10, 11)."""
 _AIRSPEED, _GROUNDSPEED = 0, 1
+_WINGED = ("plane", "quadplane")
 _ONE_MISSION = "judge a run whose mission stays as it was uploaded"
 _MOST_ITEMS = 2000
 """Items that are followed: a jump without end would never stop."""
@@ -76,10 +77,12 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     speed = 0.0
     ending: Ending = "open"
     circle_s, airspeed_ms = _circle_s(mission), _airspeed_ms(mission)
+    # a ground speed is no more than the least that a plane's airspeed is to bring
+    counted = (_AIRSPEED,) if flight_of(mission).kind in _WINGED else (_AIRSPEED, _GROUNDSPEED)
     for item in _followed(held.items):
         if item.command == TAKEOFF:
             points[0] = (0.0, 0.0, _height(item, home))
-        elif item.command == CHANGE_SPEED and item.first in (_AIRSPEED, _GROUNDSPEED):
+        elif item.command == CHANGE_SPEED and item.first in counted:
             speed = item.second if item.second > 0 else speed
         elif item.command in PLACES:
             points.append(place_of(item, home, points[-1]))
@@ -125,7 +128,7 @@ def _wait_s(item: Item, circle_s: float, airspeed_ms: float) -> float:
 
 def _circle_s(mission: Mission) -> float:
     """How long a copter takes for one circle, by CIRCLE_RATE in degrees a second; 0 of others."""
-    if flight_of(mission).kind != "copter":
+    if flight_of(mission).mode_kind not in ("copter", "heli"):
         return 0.0
     rate = _setting(mission, "CIRCLE_RATE", _CIRCLE_RATE)
     return 360.0 / abs(rate) if rate else 0.0
