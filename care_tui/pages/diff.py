@@ -12,16 +12,17 @@ from textual.content import Content
 
 from care_core.application.case import changes_of
 from care_core.application.configuring import DiffSide
-from care_core.diagnose.records import Fix, helps
+from care_core.diagnose.records import Cause, Fix, helps
 from care_core.errors import CareError
 from care_core.records import replace
 from care_core.text import clean, number_of
 from care_tui.copying import copy
-from care_tui.pages.diagnosis import DiagnosisPage
+from care_tui.pages.figured import LEAST_FIGURE
 from care_tui.pages.page import View, enter_to, sentence
+from care_tui.pages.proven import ProvenPage
 from care_tui.places import as_path
-from care_tui.render.fix import no_fix_rows
-from care_tui.render.rows import Rows, command_rows, diff_rows, error_rows, percent, warning
+from care_tui.render.fix import about_rows, no_fix_rows
+from care_tui.render.rows import Row, Rows, command_rows, diff_rows, error_rows, heading, percent, warning
 from care_tui.screens.confirm import Confirm
 from care_tui.screens.prompt import Prompt
 
@@ -42,13 +43,14 @@ def _not_a_file(typed: str) -> str:
     return "" if os.path.isfile(path) else "There is no such file."
 
 
-class DiffPage(DiagnosisPage):
+class DiffPage(ProvenPage):
     NAME = "diff"
     NOTHING = "nothing is to be changed"
     HELP = (
         "Lines with - are what is, lines with + what it would become. f compares with your own file, which it asks "
         "for, F with another; A puts the change into that file: comments stay, the old one is kept beside. c copies "
-        "the diff. Enter goes to the report. Nothing is written to the robot."
+        "the diff. Enter goes to the report. From 120 columns what is known of each parameter stands beside it, what "
+        "the change is predicted to bring, and what shows its cause. Nothing is written to the robot."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Report"),
@@ -85,8 +87,8 @@ class DiffPage(DiagnosisPage):
         if isinstance(answer, tuple):
             diff, commands, doubts = answer
             notes = [warning("File", clean(doubt)) for doubt in doubts]
-            lines = diff_rows(diff or "No difference.\n").rows
-            return View(title, lambda _: Rows([*notes, *lines, *command_rows(commands)]))
+            rows = [*notes, *diff_rows(diff or "No difference.\n").rows, *command_rows(commands)]
+            return View(title, lambda _: Rows([*rows, *self._shown_by(rows)]))
         if session.basket.ticked and session.fix_error is not None:
             error = session.fix_error
             return View(title, lambda _: error_rows(error))
@@ -96,6 +98,29 @@ class DiffPage(DiagnosisPage):
         if session.diagnosis.fix is None:
             return View(title, lambda _: no_fix_rows(session.diagnosis))
         return View(title, lambda _: sentence("No change is ticked in the fix (4)."))
+
+    def _shown_by(self, above: list[Row]) -> list[Row]:
+        """What shows in this run what the change is to mend, where these rows leave room for it."""
+        fix = self.session.fix
+        around = self.height(above) + 2
+        if fix is None or not self.is_wide or self.reader.room.height - around < LEAST_FIGURE:
+            return []
+        cause = next(self._causes(fix), None)
+        figure = [] if cause is None else self.figure(cause.option.name, cause, around)
+        return [Row(Content()), heading("What shows it in this run"), *figure] if figure else []
+
+    def _causes(self, fix: Fix) -> Iterator[Cause]:
+        """The causes that a change is to mend, those of the first fault first."""
+        changed = changes_of(fix)
+        causes = (cause for fault in self.session.diagnosis.faults for cause in fault.causes)
+        return (cause for cause in causes if cause.option.name in changed)
+
+    def beside(self) -> tuple[str, list[Row]]:
+        fix, diagnosis = self.session.fix, self.session.diagnosis
+        if fix is None or not fix.changes or not self.has_content:
+            return "", []
+        cautions = [warning("Caution", caution) for caution in self._cautions(fix)]
+        return "About the change", [*cautions, *about_rows(fix, diagnosis, self.glyphs)]
 
     @property
     def _text(self) -> str:
@@ -173,9 +198,8 @@ class DiffPage(DiagnosisPage):
 
     def _cautions(self, fix: Fix) -> Iterator[str]:
         """How unsure the cause is, and what else speaks against the change."""
-        session, changed = self.session, changes_of(fix)
-        causes = (cause for fault in session.diagnosis.faults for cause in fault.causes)
-        sure = {cause.confidence for cause in causes if cause.option.name in changed}
+        session = self.session
+        sure = {cause.confidence for cause in self._causes(fix)}
         if sure - {"high"}:
             yield f"confidence is {', '.join(sorted(sure))}: try it where nothing can be hurt first"
         driven = session.odds_unchanged()

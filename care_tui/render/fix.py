@@ -18,6 +18,8 @@ from care_tui.render.rows import Glyphs, Row, Rows, change_text, heading, measur
 BAR, PERCENT, SHORT, CHANGE, ODDS = 6, 7, 22, 32, 26
 """Cells of the bar of the odds alone and of its figure, those that a short change and any change take behind the name,
 and all that the odds take with what they are of."""
+KNOWN_WIDTH = 11
+"""Cells of what is known of a parameter before it is told."""
 
 
 def option_item(  # noqa: PLR0913
@@ -74,6 +76,16 @@ def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[
     return rows + [warning("Caveat", note) for note in notes]
 
 
+def about_rows(fix: Fix, diagnosis: Diagnosis, glyphs: Glyphs) -> list[Row]:
+    """What a change is predicted to bring, and what is known of each parameter that it changes."""
+    rows = [heading("Predicted with it (80 % intervals)"), *outcome_rows(fix, diagnosis.objectives, glyphs)]
+    for one in fix.changes:
+        head, *known = known_rows(one.option, diagnosis.run)
+        change = change_text(one.option, one.current, one.is_assumed, one.suggested, glyphs)
+        rows += [Row(Content()), Row(Content.assemble(head.content, "  ", change), KNOWN_WIDTH), *known[:-1]]
+    return rows
+
+
 def known_rows(option: Variable, run: Run) -> list[Row]:
     """What is known of an option's parameter, with who says so, for the help."""
     from care_core.application.describing import known_of
@@ -81,7 +93,9 @@ def known_rows(option: Variable, run: Run) -> list[Row]:
     rows = [heading(option.name)]
     for one in known_of(option, run.settings, run.log.facts):
         source = text(f"  ({one.source})", "dim") if one.source else Content()
-        rows.append(Row(Content.assemble(text(f"{one.what:<11}", "bold"), text(one.text), source), 11))
+        rows.append(
+            Row(Content.assemble(text(f"{one.what:<{KNOWN_WIDTH}}", "bold"), text(one.text), source), KNOWN_WIDTH)
+        )
     return [*rows, Row(Content())]
 
 

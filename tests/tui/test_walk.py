@@ -63,6 +63,12 @@ def text(app: CareApp) -> str:
     return walk(app).page.reader.plain
 
 
+def side(app: CareApp) -> str:
+    """The pane beside a figure, empty where it is hidden."""
+    reader = walk(app).page.query_one("#side", Reader)
+    return reader.plain if reader.display else ""
+
+
 def items(app: CareApp) -> str:
     choices = walk(app).page.choices
     return choices.plain if choices.display else ""
@@ -359,6 +365,23 @@ async def test_a_wide_fix_draws_the_odds_over_the_values_of_a_parameter_and_asks
         assert "z Prediction" in hints(app)
         await settle(pilot, "z")
         assert "mission_time" in text(app)
+
+
+async def test_a_wide_diff_tells_what_is_known_of_each_parameter_and_what_is_predicted(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "4", "a", "5")  # the alternative
+        assert "-LAND_SPEED 16" in text(app)
+        assert "LAND_SPEED  16 → 45 cm/s" in side(app)
+        assert re.search(r"What +descent speed of the final stage of landing", side(app))
+        assert re.search(r"Restart +needed", side(app))
+        assert "! Caution" in side(app), "one of the causes is not sure"
+        assert "mission_time" in side(app)
+        await pilot.resize_terminal(80, 24)
+        await settle(pilot)
+        assert side(app) == ""
+        await settle(pilot, "4", "space", "j", "space", "5")
+        assert "No change is ticked" in text(app)
 
 
 async def test_slash_filters_and_escape_clears(make_app: MakeApp) -> None:
