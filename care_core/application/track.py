@@ -107,18 +107,18 @@ def _flown_from(case: OpenRun, present: Mapping[str, str], channel: str) -> tupl
 
 
 def _flown_to(case: OpenRun, present: Mapping[str, str]) -> tuple[Point, ...]:
-    """The corners of a mission in degrees, longitude first, each item once."""
+    """The corners of a mission in degrees, longitude first, each item once, as it was by the mission's end."""
     channel = next((name for name in _ITEMS if name in present), None)
     if channel is None:
         return ()
-    fields = _ITEMS[channel]
+    fields, (_, end_s) = _ITEMS[channel], whole_of(case)
     table = log_of(case).read({channel: fields}).get(channel)
     if table is None or not set(fields) <= set(table.columns):
         return ()
     items = {
         int(number): (float(lng), float(lat))
-        for number, lat, lng in zip(*(table[field] for field in fields), strict=True)
-        if number and lat and lng
+        for time_s, number, lat, lng in zip(table.t, *(table[field] for field in fields), strict=True)
+        if number and lat and lng and time_s <= end_s
     }
     return tuple(items[number] for number in sorted(items))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from textual.content import Content
 
@@ -13,7 +13,7 @@ from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.text import seconds
 from care_tui.render.objectives import damage
-from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, text, warning
+from care_tui.render.rows import Glyphs, Row, cut, heading, labelled, padded, percent, text, warning
 
 TIME_WIDTH, KIND_WIDTH = 8, 10
 _SHORT = {"led to": "led to", "followed by": "then", "seen just before it": "before"}
@@ -65,6 +65,12 @@ def health_row_item(one: FindingRow, glyphs: Glyphs) -> Content:
     sign = {"critical": glyphs.fault, "warning": "!", "info": " "}[one.what.severity]
     head = padded(f"{sign} {SEVERITY_WORDS[one.what.severity]}", KIND_WIDTH + 2, _COLOURS[one.what.severity])
     return Content.assemble(head, time, text(one.what.title, "bold"), text(late))
+
+
+def happened_rows(lines: Iterable[FindingRow], width: int, glyphs: Glyphs) -> list[Row]:
+    """What happened as part of a text, a line each; nothing where nothing did."""
+    items = [Row(cut(health_row_item(line, glyphs), width, glyphs)) for line in lines]
+    return [Row(Content()), heading("What happened"), *items] if items else []
 
 
 def health_row_details(one: FindingRow) -> list[Row]:

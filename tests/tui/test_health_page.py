@@ -11,10 +11,9 @@ from care_core.records import replace
 from care_core.run import Check, Fit, MissionInfo
 from care_tui.app import CareApp
 from care_tui.settings import Settings
-from care_tui.widgets.reader import Reader
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
-from tests.tui.test_walk import answer, index, items, shown, step_of, text, title, walk
+from tests.tui.test_walk import answer, index, items, shown, side, step_of, text, title, walk
 
 
 def pinned(app: CareApp) -> list[str]:
@@ -197,6 +196,22 @@ async def test_the_picker_shows_every_mission_with_its_verdict_and_diagnoses_ano
         assert index(app) == 1
 
 
+async def test_a_wide_picker_tells_what_happened_in_the_mission_under_the_cursor(make_app: MakeApp) -> None:
+    first, second = MissionInfo(1, 2, 0.0, 70.0, ended=True, fits=True), MissionInfo(2, 2, 71.0, 200.0, True, True)
+    missions = (MissionVerdict(first, "fault", "", (sample.SLOW,)), MissionVerdict(second, "ok", "", (sample.SLOW,)))
+    app = make_app(replace(sample.crashed(), missions=missions))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "t")
+        assert "armed" in text(app)
+        assert "motor 2 lost thrust" not in text(app), "that was in the other mission"
+        await settle(pilot, "j")
+        assert "motor 2 lost thrust" in text(app)
+        assert "armed" not in text(app)
+        await pilot.resize_terminal(80, 24)
+        await settle(pilot)
+        assert "motor 2" not in text(app), "a narrow screen has the objectives alone"
+
+
 async def test_an_objective_is_judged_by_another_threshold() -> None:
     asked: list[dict[str, float]] = []
 
@@ -255,8 +270,7 @@ async def test_no_odds_are_told_without_what_no_prediction_knows_of(make_app: Ma
     async with app.run_test(size=(120, 40)) as pilot:
         await settle(pilot, "4")
         assert "unless it happens again" in answer(app)
-        side = walk(app).page.query_one("#side", Reader).plain
-        assert "Unless      it happens again: motor 2 lost thrust" in side
+        assert "Unless      it happens again: motor 2 lost thrust" in side(app)
     note = "the steering oscillates: a gain is too high: LAND_SPEED 60 (reference 50)"
     lost = replace(
         sample.all_ok(),
@@ -271,6 +285,5 @@ async def test_no_odds_are_told_without_what_no_prediction_knows_of(make_app: Ma
         assert "another thing" not in text(app)
         await settle(pilot, "enter")
         assert text(app).startswith("LAND_SPEED, cm/s"), "the cursor is on it"
-        side = walk(app).page.query_one("#side", Reader).plain
-        assert side.startswith("FAULT: motor 2 lost thrust")
-        assert "Unless      it happens again: motor 2 lost thrust" in side
+        assert side(app).startswith("FAULT: motor 2 lost thrust")
+        assert "Unless      it happens again: motor 2 lost thrust" in side(app)

@@ -68,7 +68,7 @@ def flight() -> Case:
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
-@pytest.mark.parametrize("key", ["m", "p", "M", "w"], ids=["messages", "plots", "map", "graph"])
+@pytest.mark.parametrize("key", ["m", "p", "M", "w", "t"], ids=["messages", "plots", "map", "graph", "missions"])
 def test_views(snap_compare: SnapCompare, flight: Case, size: tuple[int, int], key: str) -> None:
     app = CareApp(Request(SAMPLE), engine=fake_engine(lambda *_: flight), settings=Settings(places=()))
     assert snap_compare(app, terminal_size=size, run_before=press("1", key))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -21,12 +22,11 @@ from care_tui.render.plot import dots_across, plot
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
 from care_tui.settings import Settings
-from care_tui.widgets.reader import Reader
 from care_tui.widgets.tab_row import TabRow
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
-from tests.tui.test_walk import index, items, shown, step_of, text, title, walk
+from tests.tui.test_walk import index, items, shown, side, step_of, text, title, walk
 
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
 needs_sample = pytest.mark.skipif(not SAMPLE.is_file(), reason="the sample is not bundled")
@@ -248,9 +248,7 @@ async def test_a_wide_screen_shows_what_an_objective_is_measured_on_and_where_a_
         await settle(pilot, "2")
         assert "● track" in text(app), "of the way the map shows most"
         assert "o its corners" in text(app)
-        side = walk(app).page.query_one("#side", Reader)
-        assert "Threshold" in side.plain
-        assert side.display
+        assert "Threshold" in side(app)
         await settle(pilot, "up", "up")
         assert "position down" in text(app), "of the time a signal"
         await settle(pilot, "1", "G")
@@ -260,6 +258,26 @@ async def test_a_wide_screen_shows_what_an_objective_is_measured_on_and_where_a_
         await pilot.resize_terminal(80, 24)
         await settle(pilot, "z", "2")
         assert "Threshold" in text(app), "a narrow screen has how it was judged"
+
+
+@needs_sample
+async def test_a_wide_list_of_missions_shows_the_way_of_each(tmp_path: Path) -> None:
+    log = tmp_path / "two.BIN"
+    log.write_bytes(bundled("samples", "arducopter_motor.BIN").read_bytes() + SAMPLE.read_bytes())
+    app = CareApp(Request(log), settings=Settings(places=()))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "t")
+        assert title(app) == "2 missions"
+        assert index(app) == 1, "the one that is diagnosed"
+        assert "● track" in text(app)
+        assert re.search(r"✓ OK +path_error_max +1.232 m +<= 2 m", side(app))
+        assert "it came down slowly" in side(app)
+        await settle(pilot, "k")
+        assert "motor 4 (rear) lost thrust" in side(app)
+        assert "it came down slowly" not in side(app)
+        ruler = re.search(r"─ (\d+) m", text(app))
+        assert ruler is not None
+        assert int(ruler[1]) < 100, "the corners of the other mission lie elsewhere"
 
 
 @needs_sample
