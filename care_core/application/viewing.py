@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,8 @@ from care_core.records import Record
 if TYPE_CHECKING:
     from care_core.diagnose.verdict import RunStatus
     from care_core.ecosystems.findings import Event
-    from care_core.history.store import Triaged
+    from care_core.history.store import History, Triaged, Verified
+    from care_core.history.trends import Changed
     from care_core.report.document import TriageDocument
     from care_core.run import FitVerdict
 
@@ -94,6 +95,7 @@ class Past(Record):
     mission: int
     profile: str
     fit: FitVerdict
+    status: RunStatus
     verdict: str
     cause: str
     judged_with: str
@@ -102,11 +104,36 @@ class Past(Record):
     report: TriageDocument
     values: Mapping[str, float | None]
     config: Mapping[str, float]
+    became: tuple[str, ...]
+    """What later logs showed of the change that it was advised."""
+    before: str
+    """The log of the run before of the same robot, empty where there is none."""
+    changed: tuple[Changed, ...]
+    """What was set otherwise than in that one."""
 
 
 def past_runs() -> list[Past]:
     """What the local history holds, the newest first. Raises CareError where it is switched off."""
-    return [_past(triaged) for triaged in _remembered()]
+    from care_core.history.trends import runs_before
+
+    history = _history()
+    if history is None:
+        return []
+    triages, became = history.triages(), _became(history.verifications())
+    before = runs_before(triages)
+    return [_past(one, before.get(id(one)), became) for one in triages]
+
+
+def _became(verified: Iterable[Verified]) -> dict[str, list[str]]:
+    """What was found of advised changes, by the log whose report advised them."""
+    found: dict[str, list[str]] = {}
+    for one in verified:
+        try:
+            advised, log = one.document["report_log"]["sha256"], Path(one.document["log"]["path"]).name
+            found.setdefault(advised, []).append(f"{log}: {one.document['sentence']}")
+        except (KeyError, TypeError):  # a damaged record tells nothing
+            continue
+    return found
 
 
 class KnownVerdict(Record):
@@ -147,15 +174,22 @@ def known_verdicts(written_s: Mapping[Path, float]) -> dict[Path, KnownVerdict]:
 
 def _remembered() -> tuple[Triaged, ...]:
     """The triages of the local history. Raises CareError where it is switched off."""
+    history = _history()
+    return () if history is None else history.triages()
+
+
+def _history() -> History | None:
+    """The local history, None where there is none yet. Raises CareError where it is switched off."""
     from care_core.history.store import SWITCH, History, history_path
 
     path = history_path()
     if path is None:
         raise CareError("The history is switched off.", hint=f"Unset {SWITCH} to have runs remembered.")
-    return History(path).triages() if path.is_file() else ()
+    return History(path) if path.is_file() else None
 
 
-def _past(triaged: Triaged) -> Past:
+def _past(triaged: Triaged, before: Triaged | None, became: Mapping[str, list[str]]) -> Past:
+    from care_core.history.trends import changed
     from care_core.report.document import leading_cause, remembered_verdict
     from care_core.report.reading import remembered
 
@@ -167,6 +201,7 @@ def _past(triaged: Triaged) -> Past:
         mission=triaged.mission,
         profile=document.profile.name if document.profile else "",
         fit=document.fit.verdict,
+        status=verdict.status,
         verdict=verdict.headline,
         advice=str(verdict.advice),
         report=document,
@@ -174,4 +209,7 @@ def _past(triaged: Triaged) -> Past:
         judged_with=triaged.judged_with,
         values={entry.name: entry.value for entry in document.objectives},
         config=document.config,
+        became=tuple(became.get(document.log.sha256, ())),
+        before="" if before is None else before.log_path,
+        changed=() if before is None else changed(before, triaged),
     )

@@ -123,6 +123,14 @@ def in_order(told: Iterable[Triaged]) -> list[Triaged]:
     return runs
 
 
+def runs_before(told: Iterable[Triaged]) -> dict[int, Triaged]:
+    """The run before, of the same robot and judged by the same profile, of each run that has one, by its `id`."""
+    groups: dict[tuple[str, str], list[Triaged]] = {}
+    for run in told:
+        groups.setdefault((run.robot.id if run.robot else "", _profile(run)), []).append(run)
+    return {id(after): before for runs in groups.values() for before, after in pairwise(in_order(runs))}
+
+
 def _profile(run: Triaged) -> str:
     return run.document["profile"]["name"] if run.document["profile"] else ""
 

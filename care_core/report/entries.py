@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
-from care_core.ecosystems.findings import Finding, FindingKind, Health, Severity, SuspectKind, linked
+from care_core.ecosystems.findings import Event, Finding, FindingKind, Health, Severity, SuspectKind, linked
 from care_core.records import field
 from care_core.report.published import Document, publish
 from care_core.run import Damage
@@ -72,6 +73,29 @@ def _finding(finding: Finding) -> FindingEntry:
     consequences = [publish(ConsequenceEntry, below) for below in finding.consequences]
     followed_by = [publish(ConsequenceEntry, below) for below in finding.followed_by]
     return publish(FindingEntry, finding, consequences=consequences, followed_by=followed_by)
+
+
+def health_again(account: Iterable[EventEntry], findings: Iterable[FindingEntry]) -> Health:
+    """What happened, as far as a report that was read back tells it."""
+    timeline = (Event(_time(one.time_s), one.kind, one.text, one.source) for one in account)
+    return Health("", tuple(timeline), tuple(map(_finding_again, findings)))
+
+
+def _finding_again(one: FindingEntry) -> Finding:
+    consequences, followed_by = (tuple(map(_below_again, some)) for some in (one.consequences, one.followed_by))
+    return Finding(
+        one.kind, one.title, _time(one.onset_s), _time(one.end_s), one.severity, one.evidence, one.source,
+        after_impact=one.after_impact, consequences=consequences, followed_by=followed_by,
+    )  # fmt: skip
+
+
+def _below_again(one: ConsequenceEntry) -> Finding:
+    return Finding(one.kind, one.title, _time(one.onset_s), _time(one.onset_s), one.severity, "", "")
+
+
+def _time(time_s: float | None) -> float:
+    """A time as the log's own records have it, where none is no number."""
+    return math.nan if time_s is None else time_s
 
 
 def damage_entries(places: Iterable[Damage]) -> list[DamageEntry]:

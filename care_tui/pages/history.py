@@ -1,10 +1,10 @@
-"""Past runs from the local history: how each objective went, and two of them side by side."""
+"""Past runs from the local history: how each objective went, what was set otherwise, and two of them side by side."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.content import Content
@@ -13,15 +13,20 @@ from care_core.application.case import Request
 from care_core.application.viewing import Past, past_runs
 from care_core.diagnose.verdict import fit_words
 from care_core.errors import CareError
+from care_core.report.entries import health_again
 from care_core.text import clean, number_of
 from care_tui.messages import OpenLog
-from care_tui.pages.page import OPEN, Page, View, enter_to, sentence, view_of
+from care_tui.pages.figured import FiguredPage
+from care_tui.pages.page import OPEN, View, enter_to, sentence, view_of
+from care_tui.render.health import happened_rows, health_rows
 from care_tui.render.rows import (
     ASCII,
+    Glyphs,
     Row,
     Rows,
     by_options,
     error_rows,
+    heading,
     labelled,
     padded,
     plain_rows,
@@ -29,21 +34,27 @@ from care_tui.render.rows import (
     warning,
     without_middle,
 )
+from care_tui.render.trend import measured, trend_rows
 from care_tui.widgets.choices import Listing
+from care_tui.widgets.pane import Pane
+
+if TYPE_CHECKING:  # trends bring statistics that the page does not ask for
+    from care_core.history.trends import Changed
 
 NAME_WIDTH, VALUE_WIDTH, LOG_WIDTH = 18, 16, 26
 RUNS, WHOLE, CHECK = "runs", "both logs", "what became of it"
 TREND = 24
 """Newest runs that a trend shows."""
+CHANGES = 12
+"""Most parameters that are named of those that changed since the run before."""
 
 
-class HistoryPage(Page):
-    FITS = True
+class HistoryPage(FiguredPage):
     HELP = (
         "Runs that were triaged before, the newest first, with the trend of every objective up to the one under the "
         "cursor. Enter opens its log. c tells whether the change that it was advised was made in the open log, and "
         "what that brought. x marks a run; then every other is compared with it, and Enter puts both logs side by "
-        "side in full. / filters, Esc leaves."
+        "side in full. From 120 columns each objective is drawn over the runs, with its limits. / filters, Esc leaves."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Open its log"),
@@ -79,17 +90,28 @@ class HistoryPage(Page):
         title = Content(f"{number_of(len(runs), 'run')}; x marks one to compare with")
         if self._marked is not None:
             title = Content(f"Compared with {_named(self._marked)}; Enter: both in full; x again unmarks")
-        return View(title, lambda i: Rows([]) if i is None else self._beside(runs[i], i, runs), listing)
+        return View(title, lambda i: Rows([]) if i is None else self._detail(runs[i]), listing)
 
-    def _beside(self, past: Past, index: int, runs: list[Past]) -> Rows:
-        """What stands beside a run: what became of its advice, or both logs in full, where that was asked for."""
+    def beside(self) -> tuple[str, list[Row]]:
+        past = self._here
+        if past is None:
+            return "", []
+        rows = [*self._about(past), *self._changes(past)]
+        return _named(past), [*rows, *self._happened(past, self.choices)] if self._is_drawn(past) else rows
+
+    def _detail(self, past: Past) -> Rows:
+        """What stands beside a run: what became of its advice, or both logs in full, where that was asked for; else how
+        it compares with the marked one, or with those before it."""
         if self._checked == past:
             return self._became(past)
-        if self._marked is None or self._compared != (self._marked, past):
-            return Rows(self._detail(index, runs))
-        one, other = (Request(Path(run.log), mission=run.mission or None) for run in self._compared)
+        other = self._marked
+        if other is None or other == past:
+            return Rows(self._trends(past))
+        if self._compared != (other, past):
+            return Rows(comparison(past, other))
+        a, b = (Request(Path(run.log), mission=run.mission or None) for run in self._compared)
         compare = self.workspace.engine.compare
-        whole = self.fetched(WHOLE, lambda: compare(one, other, _silent))
+        whole = self.fetched(WHOLE, lambda: compare(a, b, _silent))
         if isinstance(whole, CareError):
             return error_rows(whole)
         if whole is None:
@@ -127,10 +149,8 @@ class HistoryPage(Page):
         told = f" {by_options(past.judged_with)}{past.verdict}"
         return line + padded(name, LOG_WIDTH, "bold") + text(told) + text(fit, "dim")
 
-    def _detail(self, index: int, runs: list[Past]) -> list[Row]:
-        past, other = runs[index], self._marked
-        if other is not None and other != past:
-            return comparison(past, other)
+    def _about(self, past: Past) -> list[Row]:
+        """What was found of a run, and what became of its advice."""
         rows = [
             labelled("Log", past.log),
             labelled("Fit", fit_words(past.profile, past.fit)),
@@ -142,12 +162,45 @@ class HistoryPage(Page):
             rows.append(labelled("Cause", past.cause))
         if past.report.fix is not None:
             rows.append(labelled("Advice", past.advice))
-        until = [run for run in reversed(runs[index:]) if run.profile == past.profile]
-        up_to_it = f"{number_of(len(until), 'run')} up to it"
-        rows += [Row(Content()), _columns("Objective", "this run", up_to_it, "bold")]
+        return rows + [labelled("" if place else "Became of it", told) for place, told in enumerate(past.became)]
+
+    def _changes(self, past: Past) -> list[Row]:
+        """What was set otherwise than in the run before."""
+        if not past.before:
+            return []
+        head = [Row(Content()), heading(f"Changed since {Path(past.before).name}, the run before")]
+        rows = [_changed(one, self.glyphs) for one in past.changed[:CHANGES]]
+        more = len(past.changed) - len(rows)
+        left_out = [Row(Content(f"and {more} more"))] if more else []
+        return [*head, *rows, *left_out] if rows else [*head, Row(Content("no parameter that both logs hold"))]
+
+    def _happened(self, past: Past, pane: Pane) -> list[Row]:
+        """What happened in a run, as it is remembered, in lines for a pane as wide as this."""
+        health = health_again(past.report.account, past.report.findings)
+        return happened_rows(health_rows(health), pane.room.width - 1, self.glyphs)
+
+    def _alike(self, past: Past) -> list[Past]:
+        """The runs that were judged by the same profile, oldest first."""
+        return [run for run in reversed(self._runs) if run.profile == past.profile]
+
+    def _is_drawn(self, past: Past) -> bool:
+        """Whether the objectives are drawn over the runs."""
+        alike = self._alike(past)
+        return self.is_wide and len(alike) > 1 and bool(measured(alike))
+
+    def _trends(self, past: Past) -> list[Row]:
+        """How each objective went up to a run, or over all of its kind where there is room to draw them."""
+        alike = self._alike(past)
+        here = alike.index(past)
+        if self._is_drawn(past):
+            return trend_rows(alike, here, *self.reader.room, self.glyphs)
+        until = alike[: here + 1]
+        rows = [_columns("Objective", "this run", f"{number_of(len(until), 'run')} up to it", "bold")]
         for name, value in past.values.items():
             rows.append(_columns(name, _shown(value), self._trend([run.values.get(name) for run in until])))
-        return rows
+        if self.is_wide:  # all else stands below the list
+            return [*rows, *self._happened(past, self.reader)]
+        return [*self._about(past), Row(Content()), *rows, *self._changes(past)]
 
     def _trend(self, values: Sequence[float | None]) -> str:
         from care_core.history.track_record import sparkline
@@ -234,6 +287,11 @@ def _named(past: Past) -> str:
 
 def _shown(value: float | None) -> str:
     return "not evaluated" if value is None else f"{value:.4g}"
+
+
+def _changed(one: Changed, glyphs: Glyphs) -> Row:
+    before, after = (value if isinstance(value, str) else f"{value:.6g}" for value in (one.before, one.after))
+    return Row(padded(one.name, NAME_WIDTH) + text(f" {before} {glyphs.to} {after}"), 2)
 
 
 def _known(value: float | None) -> str:

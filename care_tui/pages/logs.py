@@ -182,7 +182,7 @@ class LogsPage(Page):
     def _item(self, log: LogFile, now: float, width: int) -> Content:
         mark = self.glyphs.here if log.path == self.session.path else " "
         known = self._known.get(log.path)
-        verdict = Content("") if known is None else _status(known.status, self)
+        verdict = Content("") if known is None else status(known.status, self.glyphs)
         words = "" if known is None else by_options(known.judged_with) + known.words
         is_told = bool(words) and width < ROOMY
         about = " " if is_told else f" {age(now - log.modified_s):>10}  {size(log.size):>8}  "
@@ -215,7 +215,7 @@ class LogsPage(Page):
     def _about(self, log: LogFile) -> Iterator[Row]:
         known = self._known.get(log.path)
         if known is not None:
-            yield labelled("Verdict", Content.assemble(_status(known.status, self), "  ", text(known.words)))
+            yield labelled("Verdict", Content.assemble(status(known.status, self.glyphs), "  ", text(known.words)))
             if known.judged_with:
                 yield labelled("Judged", f"with {known.judged_with}, not by its own limits")
         yield labelled("Log", str(log.path))
@@ -253,12 +253,6 @@ class LogsPage(Page):
         """Look for logs again."""
         self.forget(LOGS)
         self.enter()
-
-
-def _status(verdict: RunStatus, page: Page) -> Content:
-    if verdict == "unreadable":
-        return Content.styled(f"{page.glyphs.unknown} UNREADABLE", "$text-warning")
-    return status(verdict, page.glyphs)
 
 
 def age(seconds: float) -> str:

@@ -175,7 +175,7 @@ class Figure(Record):
             rule=glyphs.line, span=span, zero=glyphs.rule,
             shaded=glyphs.shade,
         )  # fmt: skip
-        labels = self._labels(high)
+        labels = value_labels(trace.low, trace.high, high)
         rows = [Row(cut(self._head(glyphs), width, glyphs))]
         rows += [Row(Content.styled(f"{labels.get(y, ''):>{AXIS - 1}} ", "dim") + line) for y, line in enumerate(lines)]
         return [*rows, Row(self._signs(wide, span, glyphs)), Row(self._times(wide))]
@@ -188,14 +188,6 @@ class Figure(Record):
             return head
         sign, why = ". " if glyphs is ASCII else "", "beside" if self.signal.is_beside else "wanted"
         return head + Content.styled(f"  {sign}{clean(self.signal.wanted_name)} ({why})", WANTED)
-
-    def _labels(self, high: int) -> dict[int, str]:
-        """Round numbers at the lines nearest to them, and both ends where there is no round one."""
-        low, top = self.trace.low, self.trace.high
-        if not low < top:
-            return {high - 1: _number(low)}
-        ticks = {_row(value, low, top, high): _number(value) for value in value_ticks(low, top, max(high // 3, 2))}
-        return ticks or {0: _number(top), high - 1: _number(low)}
 
     def _signs(self, wide: int, span: Cells | None, glyphs: Glyphs) -> Content:
         """What happened, and the time of the finding as a line."""
@@ -225,6 +217,22 @@ class Figure(Record):
     def _place(self, time_s: float, wide: int) -> int:
         share = (time_s - self.trace.start_s) / max(self.trace.end_s - self.trace.start_s, 1e-9)
         return min(max(int(share * wide), 0), wide - 1)
+
+
+def value_labels(low: float, top: float, high: int) -> dict[int, str]:
+    """Round numbers at the nearest of the lines of a plot, and both ends where there is no round one."""
+    if not low < top:
+        return {high - 1: _number(low)}
+    ticks = {_row(value, low, top, high): _number(value) for value in value_ticks(low, top, max(high // 3, 2))}
+    return ticks or {0: _number(top), high - 1: _number(low)}
+
+
+def pointer_row(words: str, at: int, wide: int, glyphs: Glyphs) -> Row:
+    """A sign below a column of cells of a plot, with words on the side that has room."""
+    line = f"{'':>{at}}{glyphs.up} {words}"
+    if len(line) > wide:
+        line = f"{words:>{max(at - 1, len(words))}} {glyphs.up}"
+    return Row(text(f"{'':>{AXIS}}{line}", "bold"))
 
 
 def mark_rows(marks: Sequence[Mark], glyphs: Glyphs) -> list[Row]:

@@ -8,7 +8,7 @@ from textual.content import Content
 
 from care_core.report.responses import Response
 from care_tui.render.odds import promise
-from care_tui.render.plot import AXIS, LOWEST, Column, dots_across, plot
+from care_tui.render.plot import AXIS, LOWEST, Column, dots_across, plot, pointer_row
 from care_tui.render.rows import ASCII, Glyphs, Row, cut, padded, text
 
 TICKS = {0.0: "0 %", 0.5: "50 %", 1.0: "100 %"}
@@ -73,13 +73,9 @@ def _scale(response: Response, wide: int) -> Content:
 
 def _pointers(response: Response, wide: int, glyphs: Glyphs) -> list[Row]:
     """A line for each value that is pointed at: its sign below the curve, the words on the side that has room."""
-    rows = []
-    for value, what in sorted(response.marks):
-        at = round(response.scale.share(value) * (wide - 1))
-        words = f"{response.option.show(value)} {what}"
-        if at + len(words) + 2 <= wide:
-            line = f"{'':>{at}}{glyphs.up} {words}"
-        else:
-            line = f"{words:>{max(at - 1, len(words))}} {glyphs.up}"
-        rows.append(Row(text(f"{'':>{AXIS}}{line}", "bold")))
-    return rows
+    return [
+        pointer_row(
+            f"{response.option.show(value)} {what}", round(response.scale.share(value) * (wide - 1)), wide, glyphs
+        )
+        for value, what in sorted(response.marks)
+    ]

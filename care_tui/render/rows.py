@@ -19,10 +19,7 @@ from textual.style import Style
 from textual.visual import RenderOptions, Visual
 
 from care_core import text as words
-from care_core.diagnose.records import (
-    Status,
-)
-from care_core.diagnose.verdict import STATUS_WORDS
+from care_core.diagnose.verdict import STATUS_WORDS, RunStatus
 from care_core.errors import CareError
 from care_core.records import Record
 from care_core.text import clean
@@ -96,7 +93,12 @@ ASCII = Glyphs(
     shade=":",
 )
 
-_COLOURS: dict[Status, str] = {"ok": "$text-success", "fault": "bold $text-error", "not_evaluated": "$text-warning"}
+_COLOURS: dict[RunStatus, str] = {
+    "ok": "$text-success",
+    "fault": "bold $text-error",
+    "not_evaluated": "$text-warning",
+    "unreadable": "$text-warning",
+}
 
 
 class Row(NamedTuple):
@@ -244,10 +246,15 @@ def limit(threshold: Threshold | None, unit: str) -> str:
     return "no threshold" if threshold is None else f"limit {threshold} {unit}".rstrip()
 
 
-def status(value: Status, glyphs: Glyphs) -> Content:
+def status(value: RunStatus, glyphs: Glyphs) -> Content:
     """Sign and word of a status, such as `✗ FAULT`."""
-    sign = {"ok": glyphs.ok, "fault": glyphs.fault, "not_evaluated": glyphs.unknown}[value]
-    return Content.styled(f"{sign} {STATUS_WORDS[value]}", _COLOURS[value])
+    return sign_of_status(value, glyphs, f" {STATUS_WORDS[value]}")
+
+
+def sign_of_status(value: RunStatus, glyphs: Glyphs, word: str = "") -> Content:
+    """The sign of a status, alone or with its word."""
+    sign = {"ok": glyphs.ok, "fault": glyphs.fault}.get(value, glyphs.unknown)
+    return Content.styled(f"{sign}{word}", _COLOURS[value])
 
 
 def change_text(

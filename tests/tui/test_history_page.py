@@ -11,16 +11,21 @@ import pytest
 
 from care_core.application.case import Case, Request
 from care_core.application.history_writing import remember_triage
+from care_core.application.viewing import past_runs
 from care_core.diagnose.records import Diagnosis, MissionVerdict
 from care_core.errors import CareError
 from care_core.history.store import History
 from care_core.records import replace
 from care_core.report.history import history_document, history_text
+from care_core.run import Setting
 from care_tui.app import CareApp
+from care_tui.render.plot import AXIS
+from care_tui.render.rows import ASCII
+from care_tui.render.trend import trend_rows
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, fake_engine, settle
-from tests.tui.test_walk import items, shown, text, title
+from tests.tui.test_walk import items, shown, side, text, title
 
 ROOT = Path(__file__).parents[2]
 
@@ -101,6 +106,66 @@ async def test_past_runs_show_trends_and_two_are_compared() -> None:
         assert title(app).startswith("3 runs"), "x on the marked run takes the mark away"
 
 
+async def test_a_wide_history_draws_objectives_over_the_runs_and_tells_what_was_set_anew() -> None:
+    for number, (time_s, speed) in enumerate([(140.0, 50.0), (150.0, 40.0), (160.0, 40.0)], start=1):
+        made = run_of(number, time_s, speed)
+        settings = {"LAND_SPEED": Setting("LAND_SPEED", speed, "PARM")}
+        assert remember_triage(replace(made, run=replace(made.run, settings=settings))) is None
+    app = remembering_app()
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "y")
+        signs, changed = text(app).splitlines()[:2]
+        assert signs.split() == ["verdict", *"✗✗✗✗"]
+        assert [at for at, sign in enumerate(changed) if sign == "P"] == [
+            at for at, sign in enumerate(signs) if sign == "✗"
+        ][1::2], "of the second and the last run"
+        assert "mission_time  187 s  limit <= 150 s (dotted)" in text(app)
+        assert "4 of 4 runs" in text(app)
+        assert "LAND_SPEED         40 → 16" in side(app)
+        assert "Advice" in side(app)
+        await settle(pilot, "j")
+        assert "mission_time  160 s" in text(app)
+        assert "Changed since 00000002.BIN, the run before" in side(app)
+        assert "no parameter that both logs hold" in side(app)
+        await settle(pilot, "G")
+        assert "Changed since" not in side(app)
+        await pilot.resize_terminal(80, 24)
+        await settle(pilot, "g")
+        assert "140 to 187" in text(app), "a narrow screen has a line for each objective"
+
+
+@pytest.mark.parametrize("here", [0, 7, 59])
+def test_of_more_runs_than_fit_those_are_drawn_that_hold_the_one_pointed_at(here: int) -> None:
+    for number in range(3):
+        assert remember_triage(run_of(number, 140.0 + number, 50.0)) is None
+    runs = [replace(one, at=f"{place:010}") for place, one in enumerate(20 * past_runs())]
+    rows = [row.content.plain for row in trend_rows(runs, here, 30 + AXIS, 20, ASCII)]
+    assert max(map(len, rows)) <= 30 + AXIS
+    assert all(" " <= sign <= "~" for sign in "".join(rows))
+    pointer = rows[-1]
+    assert f"{here:010}, {here + 1} of 60 runs" in pointer
+    assert pointer.index("^") - AXIS == (29 if here == 59 else 0)
+
+
+async def test_a_wide_history_tells_what_happened_in_a_run_and_what_became_of_its_advice() -> None:
+    motor = replace(sample.crashed(), run=run_of(1, 187.0, 16.0).run)
+    assert remember_triage(motor) is None
+    sha256 = motor.run.log.sha256
+    sentence = "The change was made, and \x1b[31mit worked."
+    told = {"report_log": {"sha256": sha256}, "log": {"path": "/flights/2.BIN", "sha256": "2"}, "sentence": sentence}
+    profile = {"name": "arducopter", "version": "1.0"}
+    store().add_verification({**told, "p_fixed": 0.9, "worked": True, "profile": profile})
+    store().add_verification({"report_log": {"sha256": "3"}, "log": {"sha256": "4"}, "p_fixed": 0.9, "worked": True,
+                              "profile": profile})  # fmt: skip
+    app = CareApp(Request(LOG), engine=fake_engine(lambda *_: Case(sample.faulty())), settings=Settings(places=()))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "y")
+        assert "2.BIN: The change was made, and \\x1b[31mit worked." in side(app)
+        assert "motor 2 lost thrust" in text(app), "a single run is no trend"
+        assert "→ led to" in text(app)
+        assert "AUTO PreArm: [bold]" in text(app)
+
+
 async def test_runs_that_two_profiles_judged_are_said_to_be() -> None:
     made = run_of(1, 140.0, 50.0)
     assert remember_triage(replace(made, profile=replace(made.profile, name="nav2"))) is None
@@ -151,13 +216,13 @@ async def test_c_tells_whether_the_change_of_a_past_run_was_made_and_what_it_bro
         await settle(pilot, "y")
         assert "Check its change" not in shown(app), "of the open log itself"
         await settle(pilot, "j")
-        assert "Advice" in text(app)
+        assert "Advice" in side(app)
         await settle(pilot, "c")
         assert re.search(r"NOT MADE +LAND_SPEED +16 -> 50 \(16 was", text(app))
         assert re.search(r"OK +mission_time +187(.0)? -> 120", text(app))
         assert len(store().verifications()) == 1, "it is remembered as by care verify"
         await settle(pilot, "c")
-        assert "Advice" in text(app)
+        assert text(app).startswith(" verdict")
 
 
 async def test_enter_opens_the_mission_of_a_past_run() -> None:
@@ -209,7 +274,7 @@ async def test_a_verdict_by_limits_of_ones_own_is_marked_in_history_and_logs() -
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot, "y")
         assert "(with --threshold) " in items(app)
-        assert "with --threshold mission_time=20, not by its own limits" in text(app)
+        assert "with --threshold mission_time=20, not by its own limits" in side(app)
     (remembered,) = store().triages()
     assert remembered.judged_with == "--threshold mission_time=20"
     assert "(judged with --threshold mission_time=20)" in history_text(history_document(store().triages(), ()))
