@@ -17,8 +17,7 @@ def odds_over(case: OpenRun, option: Variable, beside: Mapping[str, float]) -> I
     if option.name not in modelled or beside.keys() - modelled or not option.across(2):
         return
     others = {name: value for name, value in beside.items() if name != option.name}
-    for value, answer in question_of(case).over(option.name, others):
-        yield Odds(value, answer.p_ok, answer.is_guess)
+    yield from question_of(case).odds_over(option.name, others)
 
 
 def responses_of(case: OpenRun) -> tuple[Response, ...]:

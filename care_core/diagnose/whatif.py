@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from operator import not_
+
+import numpy as np
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.kernel import FloatArray
@@ -12,7 +15,7 @@ from care_core.diagnose.fixes import change_notes, prediction
 from care_core.diagnose.judging import Judged, query_of
 from care_core.diagnose.noisy_or import NoisyOr
 from care_core.diagnose.promise import Promise
-from care_core.diagnose.records import ObjectiveResult, Prediction
+from care_core.diagnose.records import ObjectiveResult, Odds, Prediction
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.ecosystems.ranking import lost_by
 from care_core.errors import UsageError, nearest
@@ -101,12 +104,27 @@ class Question(Record, eq=False):
         )
 
     def over(self, name: str, beside: Mapping[str, float]) -> Iterator[tuple[float, Answer]]:
-        """The predictions for values of one option across its range, those of this run and of its reference among them,
-        beside other changes."""
+        """The predictions for values of one option across its range, beside other changes."""
+        for value in self._values_of(name):
+            yield value, self.ask({**beside, name: value})
+
+    def odds_over(self, name: str, beside: Mapping[str, float]) -> tuple[Odds, ...]:
+        """The odds of these answers alone, of all values at once: without intervals that nobody reads of a curve."""
+        query, values = self.query, self._values_of(name)
+        changes = [{**beside, name: value} for value in values]
+        configs = [{**query.config, **change} for change in changes]
+        p_ok, together = self._odds(configs), query.probability(configs)
+        for result in self.objectives:
+            if result.name in query.model.outcomes:  # of one without a threshold it is not a number
+                p_ok = np.fmin(p_ok, np.maximum(query.p_ok(result.name, configs), together))
+        in_support = [all(query.model.supports(*item) for item in change.items()) for change in changes]
+        return tuple(Odds(*one) for one in zip(values, p_ok.tolist(), map(not_, in_support), strict=True))
+
+    def _values_of(self, name: str) -> list[float]:
+        """Values across the range of an option, those of this run and of its reference among them."""
         option, query = self.schema.variables[name], self.query
         known = (query.config.get(name), query.reference.get(name))
-        for value in sorted({*option.across(ACROSS), *(value for value in known if value is not None)}):
-            yield value, self.ask({**beside, name: value})
+        return sorted({*option.across(ACROSS), *(value for value in known if value is not None)})
 
     def _odds(self, configs: Sequence[Config]) -> FloatArray:
         """Probability that every objective is met: of a run that failed as its report promises it."""

@@ -7,7 +7,7 @@ import re
 import pytest
 
 import care_core
-from care_core.application.open_run import OpenRun
+from care_core.application.open_run import OpenRun, question_of
 from care_core.application.responses import odds_over, responses_of
 from care_core.diagnose.records import Odds
 from care_core.files import bundled
@@ -68,6 +68,18 @@ def test_what_the_profile_does_not_model_has_no_curve(failed: OpenRun) -> None:
     option = failed.options[0]
     assert list(odds_over(failed, Variable("FRAME_TYPE", Role.OPTION, range=(0, 3)), {})) == []
     assert list(odds_over(failed, option, {"FRAME_TYPE": 1.0})) == []
+
+
+@pytest.mark.parametrize("name", ["arducopter_failed.BIN", "px4_failed.ulg"])
+def test_the_odds_of_a_curve_are_those_of_single_questions(name: str) -> None:
+    case = care_core.triage(bundled("samples", name))
+    (option,) = (change.option for change in case.diagnosis.fix.changes)  # type: ignore[union-attr]
+    other = next(one for one in case.options if one.name != option.name and one.range)
+    for beside in ({}, {other.name: other.across(5)[1]}):
+        single = [(value, one.p_ok, one.is_guess) for value, one in question_of(case).over(option.name, beside)]
+        odds = list(odds_over(case, option, beside))
+        assert [(one.value, one.is_guess) for one in odds] == [(value, is_guess) for value, _, is_guess in single]
+        assert [one.p_ok for one in odds] == pytest.approx([p_ok for _, p_ok, _ in single])
 
 
 @pytest.mark.parametrize("scale", [Scale(0.5, 50.0, is_log=True), Scale(-2.0, 3.0)])
