@@ -3,11 +3,12 @@ odds answer to the value of the parameter under the cursor."""
 
 from __future__ import annotations
 
+from asyncio import sleep
+from collections.abc import Callable
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.content import Content
-from textual.worker import get_current_worker
 
 from care_core.application.case import changes_of, fixes
 from care_core.diagnose.records import Fix, Odds
@@ -15,7 +16,6 @@ from care_core.report.responses import Response
 from care_core.text import clean, number_of
 from care_core.variables import Variable
 from care_tui.basket import nudged, parsed, possible
-from care_tui.engine import CancelledError
 from care_tui.messages import Decided
 from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.figured import FiguredPage
@@ -28,7 +28,9 @@ from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
 
 NAME_WIDTH = 26
-UNCHANGED, RESPONSE = "unchanged", "response"
+UNCHANGED, RESPONSE, REST = "unchanged", "response", "rest"
+REST_S = 0.15
+"""How long the cursor rests before values are asked for: a held key passes over options that nobody looks at."""
 CURVE = "fix.curve"
 """The id of the key that shows the curve."""
 Key = tuple[str, frozenset[tuple[str, float]]]
@@ -62,6 +64,8 @@ class FixPage(FiguredPage, DiagnosisPage):
         self._is_turned = False
         """Whether the curve has the place of the prediction, where there is room for one of them."""
         self._responses: dict[Key, list[Odds]] = {}
+        self._has_model = True
+        """Whether there are odds to ask for, as far as they were asked for."""
         self._weighed: Key | None = None
         """What the thread is at that asks for the odds over an option's values."""
 
@@ -149,7 +153,7 @@ class FixPage(FiguredPage, DiagnosisPage):
 
     def _has_figure(self, option: Variable | None) -> bool:
         """Whether the odds over an option's values have a pane of their own."""
-        if option is None or not self.reader.has_room or self.session.fix_error is not None:
+        if option is None or not self.reader.has_room or self.session.fix_error is not None or not self._has_model:
             return False
         if not (self.is_wide or self._is_turned):
             return False
@@ -170,33 +174,31 @@ class FixPage(FiguredPage, DiagnosisPage):
         return tuple((value, what) for value, what in marks.items() if value is not None)
 
     def _take_response(self, answer: object) -> None:
-        """Keep the odds under the option that they are of, which the cursor may have left; without an answer none."""
+        """Keep the odds under the option that they are of, which the cursor may have left."""
         if isinstance(answer, tuple):
             key, odds = answer
-        elif self._weighed is not None:
-            key, odds = self._weighed, []
+            self._responses[key] = odds
+            if key == self._weighed:
+                self._weighed = None
         else:
-            return
-        self._responses[key] = odds
-        if key == self._weighed:
-            self._weighed = None
+            self._has_model = False
         self.show_text(from_top=False)
 
     def _weigh(self, option: Variable) -> None:
-        """Have a thread ask for the odds of each value, and leave those of another option."""
+        """Have a thread ask for the odds of each value once the cursor has rested; those of another option are left."""
         case, key, odds_over = self.session.case, self._key(option), self.workspace.engine.odds_over
         if case is None or key == self._weighed:
             return
         self._weighed = key
 
         def work() -> tuple[Key, list[Odds]]:
-            worker, found = get_current_worker(), []
-            for one in odds_over(case, option, dict(key[1])):
-                if worker.is_cancelled:
-                    raise CancelledError
-                found.append(one)
-            return key, found
+            return key, list(odds_over(case, option, dict(key[1])))
 
+        self.workers.cancel_group(self, RESPONSE)
+        self.run_worker(self._ask_rested(work), group=REST, exclusive=True)
+
+    async def _ask_rested(self, work: Callable[[], object]) -> None:
+        await sleep(REST_S)
         self.ask(RESPONSE, work)
 
     def _caveats(self, option: Variable) -> list[str]:

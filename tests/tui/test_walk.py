@@ -7,6 +7,7 @@ import re
 from asyncio import gather
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from threading import Event
 
 import pytest
 from textual.dom import DOMNode
@@ -15,7 +16,7 @@ from textual.widgets import Static
 
 from care_core.application.case import Case
 from care_core.diagnose.records import Circumstance, Diagnosis, Fault, Odds, PathNode
-from care_core.errors import ExitCode
+from care_core.errors import CareError, ExitCode
 from care_core.records import replace
 from care_core.variables import Variable
 from care_tui.app import CareApp
@@ -365,6 +366,55 @@ async def test_a_wide_fix_draws_the_odds_over_the_values_of_a_parameter_and_asks
         assert "z Prediction" in hints(app)
         await settle(pilot, "z")
         assert "mission_time" in text(app)
+
+
+async def test_odds_that_come_after_the_cursor_has_left_are_kept_under_their_own_parameter(make_app: MakeApp) -> None:
+    app, asked, may_answer = make_app(sample.faulty()), [], Event()
+    real = app.workspace.engine.odds_over
+
+    def slow(case: Case, option: Variable, beside: Mapping[str, float]) -> Iterator[Odds]:
+        asked.append(option.name)
+        if option.name == "WPNAV_SPEED":
+            may_answer.wait(10)
+        return real(case, option, beside)
+
+    app.workspace.engine = replace(app.workspace.engine, odds_over=slow)
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "4")
+        drawn = text(app)
+        assert drawn.startswith("LAND_SPEED, cm/s")
+        await pilot.press("j")
+        while "WPNAV_SPEED" not in asked:
+            await pilot.pause(0.01)
+        await pilot.press("k")
+        may_answer.set()
+        await settle(pilot)
+        assert text(app) == drawn, "the odds of the one below are not drawn here"
+        await settle(pilot, "j")
+        assert text(app).startswith("WPNAV_SPEED, cm/s")
+        assert asked == ["LAND_SPEED", "WPNAV_SPEED"], "nor are they asked for again"
+
+
+async def test_no_odds_are_asked_for_of_what_a_held_key_passes_over(
+    make_app: MakeApp, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, asked = make_app(sample.faulty()), []
+
+    def count(_case: Case, option: Variable, _beside: Mapping[str, float]) -> Iterator[Odds]:
+        asked.append(option.name)
+        raise CareError("There is no model.")
+
+    app.workspace.engine = replace(app.workspace.engine, odds_over=count)
+    monkeypatch.setattr("care_tui.pages.fix.REST_S", 1.0)
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot)
+        await pilot.press("4", "j", "k", "j")
+        assert "Asking what each value would bring..." in text(app)
+        await settle(pilot)
+        assert asked == ["WPNAV_SPEED"]
+        assert "mission_time" in text(app), "without a model the prediction has the pane"
+        await settle(pilot, "k")
+        assert asked == ["WPNAV_SPEED"]
 
 
 async def test_a_wide_diff_tells_what_is_known_of_each_parameter_and_what_is_predicted(make_app: MakeApp) -> None:
