@@ -7,6 +7,7 @@ from textual import on
 from textual.app import ComposeResult
 from textual.containers import Container
 from textual.geometry import Size
+from textual.reactive import Reactive
 
 from care_tui.pages.page import Page
 from care_tui.render.rows import Row, Rows
@@ -17,13 +18,20 @@ FIGURE, LEAST_FIGURE = 14, 6
 """Lines of a figure below a text at most, and at least."""
 
 
+class Column(Container):
+    """Panes one below the other."""
+
+    virtual_size: Reactive[Size] = Reactive(Size(0, 0), repaint=False)
+    """Without a layout where it is news, for nothing depends on it: the screen would be laid out and painted twice."""
+
+
 class FiguredPage(Page):
     """List and `side` on the left, the figure on the right; one below the other where the screen is narrow."""
 
     FITS = True
 
     def compose(self) -> ComposeResult:
-        with Container(id="left"):
+        with Column(id="left"):
             yield Choices(self.glyphs, id="list")
             yield Reader(self.glyphs, id="side")
         yield Reader(self.glyphs, id="text")
