@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from fcntl import ioctl
 from pathlib import Path
 
-from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, Odds, PathNode, Prediction
 from care_core.records import Struct, replace
 from care_core.run import LogInfo, MissionInfo, Run
 from care_core.run import ProfileChoice as Choice
@@ -97,6 +97,7 @@ def serve_made() -> None:
     engine = Engine(
         diagnose=lambda _request, _progress: Case(diagnosis, options),
         predict=lambda _case, changes: replace(fix, p_fixed=1 / (1 + len(changes))),
+        odds_over=lambda _case, option, _beside: (Odds(v, i / 25, v > 8) for i, v in enumerate(option.across(25))),
         diff=lambda _case, _fix, _side: "-a\n+b\n",
         report=lambda _diagnosis, format: f"report {format}\n" * 100,
         preview=lambda _case, format: f"report {format.name}\n" * 100,
