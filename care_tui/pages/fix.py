@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from asyncio import sleep
 from collections.abc import Callable
+from functools import partial
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -20,14 +21,13 @@ from care_tui.messages import Decided
 from care_tui.pages.diagnosis import DiagnosisPage
 from care_tui.pages.figured import FiguredPage
 from care_tui.pages.page import View, enter_to
-from care_tui.render.fix import no_fix_rows, option_item, option_rows, outcome_rows
+from care_tui.render.fix import OptionColumns, no_fix_rows, option_change, option_item, option_rows, outcome_rows
 from care_tui.render.response import response_rows
 from care_tui.render.rows import Row, Rows, error_rows, warning
 from care_tui.screens.prompt import Prompt
 from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
 
-NAME_WIDTH = 26
 UNCHANGED, RESPONSE, REST = "unchanged", "response", "rest"
 REST_S = 0.15
 """How long the cursor rests before values are asked for: a held key passes over options that nobody looks at."""
@@ -86,19 +86,27 @@ class FixPage(FiguredPage, DiagnosisPage):
     def view_of_diagnosis(self) -> View:
         session, basket, glyphs = self.session, self.session.basket, self.glyphs
         options, alone = session.options(), session.alone()
-        width = min(max((len(clean(option.name)) for option in options), default=0), NAME_WIDTH)
+
+        def change(option: Variable) -> Content:
+            current, value = session.current(option), basket.values.get(option.name)
+            ticked = option.name in basket.ticked
+            return option_change(option, current, session.is_assumed(option), value, ticked, glyphs)
+
+        longest = max((len(clean(option.name)) for option in options), default=0)
+        changes = (change(option).cell_length for option in options if option.name in basket.values)
+        columns = partial(OptionColumns.sharing, name=longest, change=max(changes, default=0))
 
         def item(index: int, room: int) -> tuple[Content]:
             option = options[index]
             value = basket.values.get(option.name)
+            ticked = None if value is None else option.name in basket.ticked
             odds = None if value is None else alone.get((option.name, value))
-            ticked = option.name in basket.ticked
-            current, is_assumed = session.current(option), session.is_assumed(option)
-            return (option_item(option, current, is_assumed, value, ticked, odds, width, glyphs, room=room),)
+            return (option_item(option, change(option), ticked, odds, columns(room), glyphs),)
 
         index, session.option = self._place(options), None
         listing = Listing(len(options), item, lambda i: f"{options[i].name} {options[i].doc}")
-        has_figure = self._has_figure(self.option_here())
+        here = self.option_here() if index is None else options[index]
+        has_figure = self._has_figure(here or next(iter(options), None))  # a list that is new begins at the first
         about = "Odds of all objectives, by its value" if has_figure else self._about_prediction
         return View(self._title(), lambda i: self._detail(None if i is None else options[i]), listing, index, about)
 
@@ -153,7 +161,7 @@ class FixPage(FiguredPage, DiagnosisPage):
 
     def _has_figure(self, option: Variable | None) -> bool:
         """Whether the odds over an option's values have a pane of their own."""
-        if option is None or not self.reader.has_room or self.session.fix_error is not None or not self._has_model:
+        if option is None or self.session.fix_error is not None or not self._has_model:
             return False
         if not (self.is_wide or self._is_turned):
             return False

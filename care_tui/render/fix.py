@@ -8,45 +8,79 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Fix, ObjectiveResult, Prediction
 from care_core.diagnose.verdict import verdict_of
+from care_core.records import Record
 from care_core.run import Run
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.basket import possible
 from care_tui.render.odds import promise
-from care_tui.render.rows import Glyphs, Row, Rows, change_text, heading, measure, padded, text, warning
+from care_tui.render.rows import (
+    Glyphs,
+    Row,
+    Rows,
+    change_text,
+    cut,
+    heading,
+    measure,
+    padded,
+    text,
+    warning,
+    without_middle,
+)
 
-BAR, PERCENT, SHORT, CHANGE, ODDS = 6, 7, 22, 32, 26
-"""Cells of the bar of the odds alone and of its figure, those that a short change and any change take behind the name,
-and all that the odds take with what they are of."""
+BOX, BAR, PERCENT, SHORT, CHANGE, ODDS = 4, 6, 7, 22, 32, 26
+"""Cells of the box, of the bar of the odds alone and of its figure, those that a short change and any take behind
+the name, and all that the odds take with what they are of."""
+NAME_WIDTH, SHORTEST_NAME = 26, 18
+"""Cells of a name at most, and those below which it tells nothing."""
 KNOWN_WIDTH = 11
 """Cells of what is known of a parameter before it is told."""
 
 
-def option_item(  # noqa: PLR0913
-    option: Variable,
-    current: float | None,
-    is_assumed: bool,
-    value: float | None,
-    ticked: bool,
-    alone: float | None,
-    width: int,
-    glyphs: Glyphs,
-    *,
-    room: int = 80,
+class OptionColumns(Record):
+    """How the lines of the basket share their cells."""
+
+    name: int
+    odds_at: int
+    """Where the odds begin."""
+    is_told: bool
+    """Whether there is room for what the odds are of."""
+
+    @classmethod
+    def sharing(cls, room: int, name: int, change: int) -> OptionColumns:
+        """The columns in so many cells, of which the longest name and the longest change with odds take these; names
+        are cut before odds are."""
+        name, behind = min(name, NAME_WIDTH), max(SHORT, BOX + 2 + change + 2)
+        if room >= name + behind + ODDS:
+            return cls(name, min(name + max(CHANGE, behind), room - ODDS), is_told=True)
+        at = room - BAR - PERCENT
+        return cls(max(min(name, at - behind), min(name, SHORTEST_NAME)), at, is_told=False)
+
+
+def option_change(
+    option: Variable, current: float | None, is_assumed: bool, value: float | None, ticked: bool, glyphs: Glyphs
 ) -> Content:
-    """One option of the basket on one line: its box, its name padded to `width`, its change, and the odds of it alone,
-    which are not cut off in `room` cells."""
-    box = ("[x]" if ticked else "[ ]") if value is not None else "   "
+    """From what to what an option is changed, and whether that needs a reboot."""
     change = change_text(option, current, is_assumed, value, glyphs)
-    line = Content.assemble(f"{box} ", padded(option.name, width + 2, "bold" if ticked else ""), change)
-    if ticked and option.reboot_required:
-        line += Content.styled("  ! reboot", "$text-warning")
+    return change + Content.styled("  ! reboot", "$text-warning") if ticked and option.reboot_required else change
+
+
+def option_item(
+    option: Variable, change: Content, ticked: bool | None, alone: float | None, columns: OptionColumns, glyphs: Glyphs
+) -> Content:
+    """One option of the basket on one line: its box, its name, its change, and the odds of it alone.
+
+    Args:
+        ticked: None where there is nothing to tick.
+    """
+    box = "   " if ticked is None else "[x]" if ticked else "[ ]"
+    name = without_middle(option.name, columns.name, glyphs)
+    line = Content.assemble(f"{box} ", padded(name, columns.name + 2, "bold" if ticked else ""), change)
     if alone is None:
         return line
-    is_roomy = room >= width + SHORT + ODDS
-    at = min(width + CHANGE, room - ODDS) if is_roomy else room - BAR - PERCENT
-    only_this = Content(" if only this" if is_roomy else "")
-    return line.pad_right(max(at - line.cell_length, 2)) + promise(alone, glyphs, BAR) + only_this
+    line = cut(line, columns.odds_at - 1, glyphs)
+    only_this = Content(" if only this" if columns.is_told else "")
+    return line.pad_right(columns.odds_at - line.cell_length) + promise(alone, glyphs, BAR) + only_this
 
 
 def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs) -> list[Row]:

@@ -23,6 +23,7 @@ from care_tui.app import CareApp
 from care_tui.page_names import NAMES
 from care_tui.pages.making import page_classes
 from care_tui.render.causes import statistics_rows
+from care_tui.render.fix import OptionColumns, option_change, option_item
 from care_tui.render.rows import UNICODE
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
@@ -334,7 +335,7 @@ async def test_a_value_of_ones_own_has_odds_of_its_own_also_beside_other_changes
         ticked = walk(app).session.basket.ticked
         assert len(ticked) == 2
         assert set(ticked.items()) <= set(walk(app).session.alone())
-        assert walk(app).page.choices.plain.count("if only this") == 2
+        assert walk(app).page.choices.plain.count(" %") == 2
 
 
 async def test_a_wide_fix_draws_the_odds_over_the_values_of_a_parameter_and_asks_once(make_app: MakeApp) -> None:
@@ -366,6 +367,18 @@ async def test_a_wide_fix_draws_the_odds_over_the_values_of_a_parameter_and_asks
         assert "z Prediction" in hints(app)
         await settle(pilot, "z")
         assert "mission_time" in text(app)
+
+
+@pytest.mark.parametrize("room", [55, 62, 80, 110])
+def test_names_are_cut_before_odds_are(room: int) -> None:
+    long = replace(sample.WPNAV_SPEED, name="inflation_radius_of_the_global_costmap", reboot_required=False)
+    change = option_change(long, 1000.0, False, 1400.0, True, UNICODE)
+    columns = OptionColumns.sharing(room, len(long.name), change.cell_length)
+    line = option_item(long, change, True, 0.45, columns, UNICODE).plain
+    assert len(line) <= room
+    assert "45 %" in line
+    assert change.plain in line
+    assert re.search(r"\[x\] infl.*….*costmap ", line), "of a name both ends tell most"
 
 
 async def test_odds_that_come_after_the_cursor_has_left_are_kept_under_their_own_parameter(make_app: MakeApp) -> None:

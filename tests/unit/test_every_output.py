@@ -25,7 +25,7 @@ from care_core.report.writers import published, to_json, to_yaml
 from care_core.run import Fit, FitVerdict
 from care_tui.render.answer import answer_lines
 from care_tui.render.causes import cause_item, worth_rows
-from care_tui.render.fix import option_item, outcome_rows
+from care_tui.render.fix import option_change, outcome_rows
 from care_tui.render.rows import UNICODE
 from care_tui.session import Session
 from tests.made import LAND_SPEED, made_diagnosis
@@ -132,8 +132,8 @@ def test_a_value_that_no_source_holds_is_shown_as_assumed_in_every_output(readin
     assert shown["yaml"].count("assumed: true") == 3, "the cause, the change and that of the alternative"
     assert "-LAND_SPEED" not in shown["yaml"], "what no source holds is no line of the configuration as driven"
     assert "16 (assumed) → 50" in cause_item(cause, None, None, UNICODE, 80).plain
-    assert "16 (assumed) → 50" in option_item(LAND_SPEED, 16.0, True, 50.0, True, None, 12, UNICODE).plain
-    assert "16 cm/s (assumed)" in option_item(LAND_SPEED, 16.0, True, None, False, None, 12, UNICODE).plain
+    assert "16 (assumed) → 50" in option_change(LAND_SPEED, 16.0, True, 50.0, True, UNICODE).plain
+    assert "16 cm/s (assumed)" in option_change(LAND_SPEED, 16.0, True, None, False, UNICODE).plain
 
     judged = reading.judged
     config = {name: value for name, value in judged.run.config.items() if name != OPTION}
