@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from care_core.ecosystems.ardupilot.checks import fence
 from care_core.ecosystems.ardupilot.checks.settings import heading
 from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.findings import Finding
@@ -524,6 +525,36 @@ def test_a_range_that_one_motor_alone_spends_is_that_motors_weakness() -> None:
     for number, output in enumerate(made.table["RCOU"].values()):
         output[made.after(ARMED_S + 3, DOWN_S)] = 1600.0 if number == 3 else 1380.0
     assert not [one for one in made.find() if "MOT_SPIN_MAX" in one.parameters]
+
+
+def test_outputs_that_end_before_it_keeps_its_height() -> None:
+    made = MadeWithDefaults()
+    high = made.after(30.0, DOWN_S)
+    made.table["CTUN"]["ThO"][high] = 0.98
+    for name, field in (("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt"), ("POS", "RelHomeAlt")):
+        made.table[name][field][high] -= 6.0
+    made.drive("MOT_PWM_MAX", 1700.0, 2000.0)
+    finding = next(one for one in made.find() if one.kind == "thrust")
+    assert finding.parameters == (), "the outputs stay well below"
+    for output in made.table["RCOU"].values():
+        output[high] = 1660.0
+    finding = next(one for one in made.find() if one.kind == "thrust")
+    assert (finding.suspect, finding.parameters) == ("parameter", ("MOT_PWM_MAX",))
+    assert finding.wanted == (("MOT_PWM_MAX", 2000.0),)
+    assert "the outputs end at 1665 us of 2000: MOT_PWM_MAX is 1700 (as shipped 2000)" in finding.evidence
+
+
+def test_a_fence_with_the_radius_as_shipped_was_switched_on() -> None:
+    made = MadeWithDefaults()
+    made.rows["ERR"] = [(40.0, {"Subsys": 9.0, "ECode": 2.0})]
+    made.rows["MODE"] = [(0.0, {"ModeNum": 3.0}), (40.0, {"ModeNum": 6.0})]
+    far: dict[str, float | str] = {"CNum": 1.0, "CId": 16.0, "Lat": 47.002, "Lng": 8.0, "Alt": 12.0, "Frame": 3.0}
+    made.rows["CMD"] = [(1.0, far)]
+    made.drive("FENCE_ENABLE", 1.0, 0.0)
+    made.drive("FENCE_RADIUS", 100.0, 100.0)
+    assert next(fence.find(made.flight())).parameters == ("FENCE_ENABLE", "FENCE_RADIUS")
+    made.drive("FENCE_RADIUS", 100.0, 300.0)
+    assert next(fence.find(made.flight())).parameters == ("FENCE_RADIUS",)
 
 
 def test_a_throttle_that_swings_names_the_gain_that_was_raised() -> None:

@@ -27,6 +27,7 @@ _TOO_HIGH, _TOO_FAR = 1, 2
 _ABOVE_HOME = frozenset((3, 6))
 """Frames of a height above home (MAV_FRAME)."""
 _METRES = 111319.5
+_SWITCHES = ("FENCE_ENABLE", "FENCE_AUTOENABLE")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -56,9 +57,15 @@ def find(flight: Flight) -> Iterator[Finding]:
                 suspect="parameter",
                 probability=_WAS_SENT,
                 mission_lost=_STOPS,
-                parameters=(parameter,),
+                parameters=_set_so(flight, parameter),
             )
             return
+
+
+def _set_so(flight: Flight, limit: str) -> tuple[str, ...]:
+    """What made the fence what it is: its limit, or, where that is as shipped, first that it was switched on."""
+    switched = [name for name in _SWITCHES if flight.default_left(name) is not None]
+    return (limit,) if flight.default_left(limit) is not None else (*switched, limit)
 
 
 def _highest(flight: Flight, at: float) -> float | None:

@@ -7,6 +7,7 @@ needs more has too little in hand to keep its attitude. 97.5 % of the healthy tr
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,7 +67,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         grounded = not flight.flown and lasted > _GROUNDED_S
         lost = flight.impact_s is not None or any(code for _, code in flight.errors(_FAILSAFE_BATT))
         severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
-        suspect, why = _by_option(flight)
+        behind = _behind(flight)
         yield Finding(
             kind="thrust",
             title="too little thrust",
@@ -77,25 +78,31 @@ def find(flight: Flight) -> Iterator[Finding]:
                 f"throttle above {100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
                 + (f", {below:.1f} m below the height wanted" if below else "")
                 + f"; {100 * before:.0f} % before that"
-                + why
+                + behind.why
             ),
             source="CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875",
-            suspect=suspect,
-            probability=_PROBABILITY[suspect],
+            suspect=behind.suspect,
+            probability=behind.probability,
+            parameters=behind.parameters,
+            wanted=behind.wanted,
         )
     elif high and sum(b - a for a, b in high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
         share = float(median(level[flown]))
-        suspect, why = _by_option(flight)
+        behind = _behind(flight)
         yield Finding(
             kind="thrust",
             title=f"hovering takes {100 * share:.0f} % of the throttle",
             onset_s=high[0][0],
             end_s=high[-1][1],
             severity="warning",
-            evidence=f"mean throttle {100 * share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %){why}",
+            evidence=(
+                f"mean throttle {100 * share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %){behind.why}"
+            ),
             source="CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875",
-            suspect=suspect,
-            probability=_PROBABILITY[suspect],
+            suspect=behind.suspect,
+            probability=behind.probability,
+            parameters=behind.parameters,
+            wanted=behind.wanted,
         )
 
 
@@ -109,12 +116,29 @@ def saturated(flight: Flight) -> list[Span]:
     return lasting(t, flown & (throttle > FULL), _FULL_LASTS_S, gap_s=1.0)
 
 
-def _by_option(flight: Flight) -> tuple[SuspectKind, str]:
-    """Whether a parameter keeps the motors from their full output."""
+class _Behind(NamedTuple):
+    """What lacks where thrust does."""
+
+    suspect: SuspectKind
+    why: str
+    probability: float
+    parameters: tuple[str, ...] = ()
+    wanted: tuple[tuple[str, float], ...] = ()
+
+
+def _behind(flight: Flight) -> _Behind:
+    """Whether a parameter keeps the motors from their full output. A low MOT_SPIN_MAX is left to a profile, which knows
+    what it does."""
     most = flight.setting("MOT_SPIN_MAX")
     if most is not None and 0.0 < most < SPIN_MOST:
-        return "parameter", f"; MOT_SPIN_MAX={most:g} keeps the motors from their full output (0.95 is usual)"
-    return "hardware", ""
+        why = f"; MOT_SPIN_MAX={most:g} keeps the motors from their full output (0.95 is usual)"
+        return _Behind("parameter", why, _PROBABILITY["parameter"])
+    kept = hover.ended(flight)
+    if kept is None:
+        return _Behind("hardware", "", _PROBABILITY["hardware"])
+    why = f"; the outputs end at {kept.end_us:.0f} us of {kept.whole_us:.0f}: {kept}"
+    wanted = ((kept.parameter, kept.wanted),)
+    return _Behind("parameter", why, hover.keeps_down(kept), (kept.parameter,), wanted)
 
 
 def climbs(flight: Flight, start: float, end: float) -> bool:

@@ -74,19 +74,30 @@ def _kept_down(flight: Flight) -> Iterator[Finding]:
             evidence=f"{span[1] - span[0]:.0f} s at full throttle without rising; {reached}{kept}",
             source="CTUN.ThO, RCOU",
             suspect="parameter",
-            probability=float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE, _UNSURE))),
+            probability=keeps_down(kept),
             parameters=(kept.parameter,),
             wanted=((kept.parameter, kept.wanted),),
         )
 
 
+def keeps_down(kept: Kept) -> float:
+    """How probable it is that a copter which spends all that its motors have lacks what this takes."""
+    return float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE, _UNSURE)))
+
+
+def ended(flight: Flight) -> Kept | None:
+    """The parameter that ends a copter's outputs well below their range, where they reach that end."""
+    kept = kept_from_range(flight, "MOT_")
+    return kept if kept is not None and kept.share < _KEPT and _reaches(flight, kept) else None
+
+
 def kept_down(flight: Flight) -> tuple[Kept, Span] | None:
     """The parameter that keeps a copter on the ground, and when; None where none does, and where one motor alone is at
     its end while the others have range left: that is a motor's own weakness."""
-    kept, span = kept_from_range(flight, "MOT_"), _spent_on_ground(flight)
-    if kept is None or kept.share >= _KEPT or span is None:
+    kept, span = ended(flight), _spent_on_ground(flight)
+    if kept is None or span is None:
         return None
-    return (kept, span) if _reaches(flight, kept) and _all_are_spent(flight, span) else None
+    return (kept, span) if _all_are_spent(flight, span) else None
 
 
 def _reaches(flight: Flight, kept: Kept) -> bool:
