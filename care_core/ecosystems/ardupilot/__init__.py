@@ -40,9 +40,10 @@ class ArduPilot(Ecosystem):
     def model(self, log: Log) -> RunModel:
         from care_core.ecosystems.ardupilot.flight import Flight
         from care_core.ecosystems.ardupilot.heights import in_metres
+        from care_core.ecosystems.ardupilot.rates import in_degrees
         from care_core.logs.telemetry import as_dataflash
 
-        return Flight(as_dataflash(in_metres(log)))
+        return Flight(as_dataflash(in_degrees(in_metres(log))))
 
     def examine(self, model: RunModel) -> Health:
         from care_core.ecosystems.ardupilot.examining import examine

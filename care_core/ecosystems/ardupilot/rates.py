@@ -1,0 +1,72 @@
+"""Rates in degrees a second and outputs from -1 to 1, whatever unit a firmware wrote them in.
+
+Until ArduCopter 3.4 RATE held hundredths of a degree a second (AC_ATTITUDE_CONTROL_DEGX100) and outputs from -4500 to
+4500, without a word of the log on it. An output tells its own unit, and where it is an old one the gyros tell that of
+the rates: the two changed one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from care_core.logs.base import Log, Table, Wanted
+from care_core.numbers import Floats, quantile
+from care_core.records import Record
+
+_MESSAGE = "RATE"
+_RATES, _OUTPUTS = ("R", "RDes", "P", "PDes", "Y", "YDes"), ("ROut", "POut", "YOut")
+_TOLD: Wanted = {_MESSAGE: ("R", "P", *_OUTPUTS)}
+_GYROS: Wanted = {"IMU": ("GyrX", "GyrY")}
+_CENTI, _OUTPUT = 0.01, 1 / 4500
+_OVER = 2.0
+"""An output beyond all that the motors have, 1, is one of 4500."""
+_FROM, _TO = 30.0, 300.0
+"""By what factor hundredths of a degree are more than degrees: the gyro's spread and the rate's differ by less."""
+
+
+def in_degrees(log: Log) -> Log:
+    """The log with rates in degrees a second, and their outputs from -1 to 1."""
+    return _InDegrees(log)
+
+
+class _InDegrees(Record, eq=False, dict=True):
+    log: Log
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.log, name)
+
+    def read(self, wanted: Wanted) -> Mapping[str, Table]:
+        tables = self.log.read(wanted)
+        table = tables.get(_MESSAGE)
+        if table is None or self._scales == (1.0, 1.0):
+            return tables
+        rate, output = self._scales
+        scales = {**dict.fromkeys(_RATES, rate), **dict.fromkeys(_OUTPUTS, output)}
+        columns = {name: table[name] * scales[name] if name in scales else table[name] for name in table.columns}
+        return {**tables, _MESSAGE: Table(table.t, columns)}
+
+    @cached_property
+    def _scales(self) -> tuple[float, float]:
+        """Degrees a second of one unit of a rate, and the share of all the motors have of one unit of an output."""
+        told = self.log.read(_TOLD).get(_MESSAGE)
+        if told is None or max(_spreads(told, _OUTPUTS)) <= _OVER:
+            return 1.0, 1.0
+        gyros = self.log.read(_GYROS).get("IMU")
+        turned = [] if gyros is None else np.degrees(_spreads(gyros, _GYROS["IMU"])).tolist()
+        ratios = [rate / gyro for rate, gyro in zip(_spreads(told, ("R", "P")), turned, strict=False) if gyro > 0]
+        is_centi = not ratios or any(_FROM < ratio < _TO for ratio in ratios)
+        return _CENTI if is_centi else 1.0, _OUTPUT
+
+
+def _spreads(table: Table, fields: Sequence[str]) -> list[float]:
+    """How far each field goes from zero, all but the hundredth of its records that goes farthest; 0 if not recorded."""
+    return [_spread(np.asarray(table.columns.get(field, ()), np.float64)) for field in fields]
+
+
+def _spread(values: Floats) -> float:
+    known = np.abs(values[np.isfinite(values)])
+    return quantile(known, 0.99) if len(known) else 0.0
