@@ -953,6 +953,15 @@ def test_a_submarine_that_fights_to_hold_still_lacks_a_thruster(output: str, nam
     assert found.kind == "motor"
 
 
+def test_the_noise_of_a_monitor_is_no_cell_more() -> None:
+    made = Made()
+    made.settings.pop("MOT_BAT_VOLT_MAX")
+    made.table["BAT"]["Volt"] += 12 * 4.2 - made.table["BAT"]["Volt"][0]
+    assert "the battery was not charged" not in [one.title for one in made.find()]
+    made.table["BAT"]["Volt"] += made.noise(1.0)
+    assert "the battery was not charged" not in [one.title for one in made.find()]
+
+
 def test_a_submarine_that_leaks() -> None:
     dive = Made()
     dive.facts = {"firmware": "ArduSub V4.5.0"}
@@ -969,6 +978,18 @@ def test_a_turn_that_its_own_control_drives_on_is_told(out: float, told: bool) -
     zero = np.zeros_like(made.t)
     made.table["RATE"] = {"R": zero, "P": zero, "RDes": zero, "PDes": zero, "ROut": zero, "POut": zero,
                           "Y": turns, "YDes": np.sign(pushes) * 60.0, "YOut": pushes}  # fmt: skip
+    assert ("it spins against its control" in [one.title for one in made.find()]) is told
+
+
+@pytest.mark.parametrize(("begins_dps", "told"), [(0.0, True), (150.0, False)])
+def test_what_starts_to_turn_against_its_control_spins_and_what_stops_does_not(begins_dps: float, told: bool) -> None:
+    made = Made()
+    since = made.t - 40.0
+    turns = np.where(since < 3.0, begins_dps + (60.0 - begins_dps) * since / 3.0, 60.0 - 10.0 * (since - 3.0))
+    turns = np.where((since > 0.0) & (since < 7.0), turns, 0.0)
+    zero = np.zeros_like(made.t)
+    made.table["RATE"] = {"R": zero, "P": zero, "RDes": zero, "PDes": zero, "ROut": zero, "POut": zero,
+                          "Y": turns, "YDes": zero, "YOut": np.where(turns > 0, -0.6, 0.0)}  # fmt: skip
     assert ("it spins against its control" in [one.title for one in made.find()]) is told
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import smooth
 from care_core.logs.base import Table
 from care_core.numbers import median, quantile
 from care_core.records import Record
@@ -20,6 +21,8 @@ _LEAST_FULL_V = 3.0
 """A pack whose best moment is below this a cell has fewer cells than the parameter says."""
 _PACKS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14)
 _ALIVE_V, _MOST_V = 4.0, 120.0
+_STEADY_S = 2.0
+"""Over so long a voltage is that of the pack, and no longer the noise of a monitor, which may be a cell's."""
 _FULL_PACK = ("MOT_BAT_VOLT_MAX", "MOT_V_MAX", "Q_M_BAT_VOLT_MAX")
 """Parameters of the voltage of a full pack, which the motors' output is scaled by."""
 
@@ -48,7 +51,7 @@ class Battery(Record, eq=False):
         alive = within_reason(table)
         start_s, start_v = _start(flight, table)
         full = flight.setting(*_FULL_PACK) if number == 1 else None
-        highest = quantile(alive["Volt"], 0.99) if len(alive) else 0.0
+        highest = quantile(smooth(alive.t, alive["Volt"], _STEADY_S), 0.99) if len(alive) else 0.0
         fewest = max(math.ceil((highest - 0.3) / (FULL_V + 0.05)), 1)
         by_parameter = round(full / FULL_V) if full else 0
         is_by_parameter = by_parameter >= fewest and highest / max(by_parameter, 1) >= _LEAST_FULL_V

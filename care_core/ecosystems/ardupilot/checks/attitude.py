@@ -36,6 +36,7 @@ _YAW_LASTS_S = LIMITS.add("shortest time off the heading", 3.0, "s", "a choice")
 _SPINS_DPS = LIMITS.add("turn against its control", 40.0, "deg/s", "a choice: gusts turn it slower")
 _PUSHES = LIMITS.add("output that is to turn it back", 0.2, "of the range", "a choice: less hardly turns it")
 _SPINS_S = LIMITS.add("shortest turn against its control", 2.0, "s", "a choice: a blow is countered sooner")
+_BEGINS = LIMITS.add("rate at first, of a turn that gets faster", 0.8, "of it", "a choice: noise is less")
 _NEARLY = LIMITS.add("rate off a turn that is followed", 0.5, "of it", "a choice: rates lag as a turn begins")
 _TURNED = LIMITS.add("probability of wrong turning directions", 0.7, "", "a choice: yaw that is spent shows alike")
 _WAVERS_DEG = LIMITS.add("heading that wavers in a turn", 10.0, "deg", "a choice")
@@ -185,13 +186,9 @@ def _spins(flight: Flight) -> Iterator[Finding]:
     if table is None:
         return
     t, rate, out = table.t, table["Y"], table["YOut"]
-    against = (np.abs(rate) > _SPINS_DPS) & (rate * out < 0) & (np.abs(out) > _PUSHES)
+    against = (rate * out < 0) & (np.abs(out) > _PUSHES)
     against &= (np.abs(rate - table["YDes"]) > _SPINS_DPS) & during(flight.flown, t)
-    spans = [
-        (start, end)
-        for start, end in lasting(t, against, _SPINS_S)
-        if np.abs(np.interp(end, t, rate)) > np.abs(np.interp(start, t, rate))
-    ]
+    spans = [span for span in lasting(t, against, _SPINS_S) if _speeds_up(t, np.abs(rate), *span)]
     if spans:
         start, end = spans[0]
         most = float(np.max(np.abs(rate[(t >= start) & (t <= end)])))
@@ -212,6 +209,15 @@ def _spins(flight: Flight) -> Iterator[Finding]:
             suspect="hardware" if had_turned else "operation",
             probability=_LOST if had_turned else _TURNED,
         )
+
+
+def _speeds_up(t: Floats, rate: Floats, start: float, end: float) -> bool:
+    """Whether a turn gets faster and goes far: one that is only slow to stop gets slower from its first moment on."""
+    inside = (t >= start) & (t <= end)
+    begun, most = float(np.interp(start, t, rate)), float(np.max(rate[inside]))
+    is_faster = float(np.interp(end, t, rate)) > begun or begun < _BEGINS * most
+    turned = float(np.sum(rate[inside][1:] * np.diff(t[inside])))
+    return is_faster and most > _SPINS_DPS and turned > _SPINS_DPS * _SPINS_S
 
 
 def _turned_as_told(flight: Flight, table: Table, until: float) -> bool:
