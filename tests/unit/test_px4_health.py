@@ -127,6 +127,19 @@ def test_a_vehicle_that_is_not_ready_says_why() -> None:
     ]  # fmt: skip
 
 
+def test_what_the_commander_armed_was_armed_where_no_state_is_recorded() -> None:
+    said = words(
+        (2.0, "NOTICE", "Preflight Fail: Compasses inconsistent"),
+        (3.0, "NOTICE", "Armed by external command"),
+        (40.0, "NOTICE", "Disarmed by landing"),
+    )
+    health = examine(Px4Flight(MadeLog({"logged_messages": said})))
+    assert not [one.title for one in health.findings]
+    assert texts(health, "arming") == [
+        "Preflight Fail: Compasses inconsistent", "armed by external command", "disarmed by landing, armed for 37 s",
+    ]  # fmt: skip
+
+
 def test_a_complaint_before_an_arming_is_no_finding() -> None:
     said = words((3.0, "WARNING", "[health_and_arming_checks] Preflight: GPS fix too low"))
     health = examine(Px4Flight(MadeLog({"vehicle_status": FLOWN, "logged_messages": said})))

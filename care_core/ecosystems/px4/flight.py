@@ -56,7 +56,7 @@ _GAVE_UP = 0b10001111
 _IDLE_S = 60.0
 _MARKS = re.compile(r"\x1b?\[\d+m")
 _SPEAKER = re.compile(r"^\[\w+\]\s*")
-_ARMED_BY = re.compile(r"\[commander\] (?:Armed|Disarmed) (by .+)")
+_ARMED_BY = re.compile(r"(?:\[commander\] )?(Armed|Disarmed) (by .+)")
 _PREFLIGHT = re.compile(
     r"Preflight|Arming check|health_and_arming_checks|Not ready|arming denied|Mission rejected"
     r"|Geofence violation for waypoint",
@@ -90,8 +90,10 @@ class Px4Flight(RunModel):
 
     @cached_property
     def arming(self) -> tuple[tuple[float, bool], ...]:
-        """Whether it was armed at first, and when that changed."""
-        return tuple((t, state == _ARMED) for t, state in self.changes(STATUS, "arming_state"))
+        """Whether it was armed at first, and when that changed; by the commander's words where no state is recorded."""
+        told = tuple((t, state == _ARMED) for t, state in self.changes(STATUS, "arming_state"))
+        said = ((t, _ARMED_BY.match(text)) for t, _, text in self.messages)
+        return told or tuple((t, match[1] == "Armed") for t, match in said if match)
 
     @cached_property
     def armed(self) -> tuple[Span, ...]:
@@ -125,10 +127,10 @@ class Px4Flight(RunModel):
         rows = zip(table.t.tolist(), levels, table["message"].tolist(), strict=True)
         return tuple((t, str(level), _MARKS.sub("", str(text)).strip()) for t, level, text in rows)
 
-    def armed_by(self, t: float) -> str:
+    def armed_by(self, t: float, *, is_armed: bool) -> str:
         """What the commander says of an arming or disarming at a time: "by landing"; "" where it says nothing."""
         matches = (_ARMED_BY.match(text) for at, _, text in self.messages if abs(at - t) < SAID_WITHIN_S)
-        return next((match[1] for match in matches if match), "")
+        return next((match[2] for match in matches if match and (match[1] == "Armed") == is_armed), "")
 
     @cached_property
     def complaints(self) -> tuple[tuple[float, str], ...]:

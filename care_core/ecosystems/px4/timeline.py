@@ -79,10 +79,11 @@ def timeline(flight: Px4Flight, tables: Collection[Table]) -> tuple[Event, ...]:
 def _arming(flight: Px4Flight) -> Iterator[Event]:
     since: float | None = None
     for at, (t, is_armed) in enumerate(flight.arming):
-        how = f" {flight.armed_by(t)}" if flight.armed_by(t) else ""
+        by = flight.armed_by(t, is_armed=is_armed)
+        how = f" {by}" if by else ""
         if is_armed:
             since = t
-            yield Event(t, "arming", "armed when the log begins" if at == 0 else f"armed{how}", STATUS)
+            yield Event(t, "arming", f"armed{how}" if at or by else "armed when the log begins", STATUS)
         elif at:
             lasted = f", armed for {t - since:.0f} s" if since is not None else ""
             yield Event(t, "arming", f"disarmed{how}{lasted}", STATUS)
