@@ -333,10 +333,10 @@ def test_a_transform_whose_fields_are_declared_as_what_they_are_not_says_nothing
         return made
 
     t = np.array([0.0, 1.0])
-    assert odometry._map_to_odom(t, *columns(good, good)).tolist() == [[0.0, 1.0, 2.0], [1.0, 1.0, 2.0]]
-    assert len(odometry._map_to_odom(t, *columns(good, good | wrong))) == 1
+    assert odometry._edges(t, *columns(good, good))["map -> odom"].tolist() == [[0.0, 1.0, 2.0], [1.0, 1.0, 2.0]]
+    assert len(odometry._edges(t, *columns(good, good | wrong))["map -> odom"]) == 1
     scalars = [np.array([7, 7], dtype=object)] * 4
-    assert len(odometry._map_to_odom(t, *scalars)) == 0
+    assert not odometry._edges(t, *scalars)
 
 
 def test_what_is_never_published_is_told_in_words() -> None:
@@ -422,11 +422,46 @@ def test_the_greatest_speed_that_is_told_lasted(tmp_path: Path) -> None:
     assert "0.5" in said.text.partition("m in all, ")[2]
 
 
+@pytest.mark.parametrize(("ahead_s", "told"), [(20881.0, True), (-20881.0, False), (0.3, False)])
+def test_stamps_of_the_future_are_of_another_clock(ahead_s: float, told: bool, tmp_path: Path) -> None:
+    class Ahead(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                if name == ODOMETRY:
+                    made = stamp(ROS2, START_NS + round((time_s + ahead_s) * SECOND_NS))
+                    message.header = dataclasses.replace(message.header, stamp=made)
+                yield topic, name, time_s, message
+
+    titles = [one.title for one in looked_at(Ahead(), tmp_path).findings]
+    assert any("20881.0 s (5:48:01) ahead of the recording" in title for title in titles) is told
+
+
 @pytest.mark.parametrize(("places", "told"), [((0.0, 1.5), "two sources publish map -> odom in turn"), ((0.0,), "")])
 def test_two_sources_of_one_transform_are_told(places: tuple[float, ...], told: str) -> None:
     x = np.array([places[n % len(places)] + 0.001 * n for n in range(60)])
     steps = np.abs(np.diff(x))
     assert (odometry._in_turn(x, np.zeros(60), steps) is not None) is bool(told)
+
+
+@pytest.mark.parametrize(("apart_m", "until", "told"), [(4.0, 300, True), (4.0, 60, False), (0.1, 300, False)])
+def test_two_sources_of_where_the_base_is_are_told_though_one_sends_seldom(
+    apart_m: float, until: int, told: bool
+) -> None:
+    number = np.arange(300)
+    places = np.stack([0.1 * number, 0.02 * number + apart_m * (number % 11 == 5) * (number < until), 0.0 * number], 1)
+    assert bool(len(odometry._aside(places))) is told
+
+
+@pytest.mark.parametrize(
+    ("parent", "child", "edge"),
+    [("/map", "/odom", "map -> odom"), ("odom", "base_link", "odom -> base_link"), ("base_link", "odom", ""),
+     ("r2/odom", "r2/base_footprint", "r2/odom -> r2/base_footprint"), ("odom", "wheel", "")],
+)  # fmt: skip
+def test_the_transforms_that_say_where_a_robot_is(parent: str, child: str, edge: str) -> None:
+    x, y = np.array([[1.0]]), np.array([[2.0]])
+    assert list(odometry._edges(np.zeros(1), np.array([[parent]]), np.array([[child]]), x, y)) == (
+        [edge] if edge else []
+    )
 
 
 def test_a_laser_that_pauses_again_and_again_while_the_odometry_goes_on_drops_out(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sized
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,8 @@ IN_TURN = LIMITS.add(
 )
 BACK = LIMITS.add("how near it is to where it was, in steps", 0.3, "", "while the robot moves, both change a little")
 LIMITS.add("step of odometry there and back", TURN_M, "m", "noise at rest is a tenth of it")
+OFTEN = LIMITS.add("steps of odom -> base there and back", 10, "", "odometry that leaps once or twice is of one source")
+THROUGHOUT = LIMITS.add("share of the recording that they span", 0.5, "", "a choice: two sources run side by side")
 PLACES = LIMITS.add("transforms of map -> odom", 3, "", "fewer show no step")
 FOUND_S = LIMITS.add("time to find the robot on the map", 5.0, "s", "the first corrections are large")
 PUSHED_S = LIMITS.add("time after a contact that is not compared", 10.0, "s", "a choice: it pushes, or backs off")
@@ -258,13 +261,16 @@ def _corrections(drive: Drive) -> Iterator[Finding]:
     for topic, table in drive.of(*TF):
         if not holds(table, TF[0]):
             continue
-        places = _map_to_odom(table.t, *(table[name] for name in PLACED))
+        edges = _edges(table.t, *(table[name] for name in PLACED))
+        driven = ((edge, places.T[0], _aside(places)) for edge, places in edges.items() if edge != _MAP_TO_ODOM)
+        yield from (_two_sources(drive, topic, *one) for one in driven if len(one[2]))
+        places = edges.get(_MAP_TO_ODOM, np.empty((0, 3)))
         if len(places) < PLACES:
             continue
         t, x, y = places.T
         steps = np.hypot(np.diff(x), np.diff(y))
         if (turns := _in_turn(x, y, steps)) is not None:
-            yield _two_sources(drive, topic, t, turns)
+            yield _two_sources(drive, topic, _MAP_TO_ODOM, t, turns)
             return
         rows = np.flatnonzero(steps > CORRECTION_M)
         rows = rows[t[rows + 1] > t[0] + FOUND_S]
@@ -291,6 +297,16 @@ def _in_turn(x: Floats, y: Floats, steps: Floats) -> NDArray[np.intp] | None:
     return turns if len(turns) >= IN_TURN * len(steps) and len(turns) > PLACES else None
 
 
+def _aside(places: Floats) -> NDArray[np.intp]:
+    """The steps to elsewhere, far and back, that go on from one end of the recording to the other: of a robot that
+    drives, where both sources move on, and one may send seldom."""
+    t, x, y = places.T
+    steps, back = np.hypot(np.diff(x), np.diff(y)), np.hypot(x[2:] - x[:-2], y[2:] - y[:-2])
+    turns = np.flatnonzero((steps[:-1] > JUMP_M) & (back < BACK * steps[:-1]))
+    is_often = len(turns) >= OFTEN and t[turns[-1]] - t[turns[0]] > THROUGHOUT * (t[-1] - t[0])
+    return turns if is_often else turns[:0]
+
+
 def _two_publishers(drive: Drive, odometry: Odometry) -> Finding:
     """A driver and a filter, or two robots of one network: who listens takes the robot to leap at each message."""
     rows = odometry.in_turn
@@ -308,10 +324,10 @@ def _two_publishers(drive: Drive, odometry: Odometry) -> Finding:
     )
 
 
-def _two_sources(drive: Drive, topic: str, t: Floats, turns: NDArray[np.intp]) -> Finding:
+def _two_sources(drive: Drive, topic: str, edge: str, t: Floats, turns: NDArray[np.intp]) -> Finding:
     return Finding(
         kind="localisation",
-        title="two sources publish map -> odom in turn",
+        title=f"two sources publish {edge} in turn",
         onset_s=float(t[turns[0]]),
         end_s=float(t[turns[-1] + 1]),
         severity=drive.severity(float(t[turns[0]])),
@@ -322,17 +338,30 @@ def _two_sources(drive: Drive, topic: str, t: Floats, turns: NDArray[np.intp]) -
     )
 
 
-def _map_to_odom(t: Floats, *columns: NDArray[Any]) -> Floats:
-    """Time, x and y of each map -> odom transform, shape (n, 3). The log itself says of what type its fields are: names
-    that are no text name nothing."""
-    rows = []
+def _edges(t: Floats, *columns: NDArray[Any]) -> dict[str, Floats]:
+    """Time, x and y of each transform of map -> odom, which stands for all such, and of each from an odom to a base,
+    shape (n, 3). The log itself says of what type its fields are: names that are no text name nothing."""
+    rows: dict[str, list[tuple[float, float, float]]] = {}
     for time_s, *fields in zip(t.tolist(), *columns, strict=True):
         if not all(isinstance(field, Sized) for field in fields):
             continue
         for parent, child, x, y in zip(*fields, strict=False):
-            if str(parent).strip("/") == "map" and str(child).strip("/").endswith("odom") and _is_number(x, y):
-                rows.append((time_s, x, y))
-    return np.array(rows, np.float64).reshape(-1, 3)
+            edge = _edge(str(parent).strip("/"), str(child).strip("/"))
+            if edge and _is_number(x, y):
+                rows.setdefault(edge, []).append((time_s, x, y))
+    return {edge: np.array(found, np.float64) for edge, found in rows.items()}
+
+
+_MAP_TO_ODOM = "map -> odom"
+
+
+@lru_cache(maxsize=1_000)
+def _edge(parent: str, child: str) -> str:
+    """The name of a transform that says where a robot is; "" of any other."""
+    if parent == "map" and child.endswith("odom"):
+        return _MAP_TO_ODOM
+    is_base = parent.endswith("odom") and child.rpartition("/")[2].startswith("base")
+    return f"{parent} -> {child}" if is_base else ""
 
 
 def _is_number(*values: object) -> bool:

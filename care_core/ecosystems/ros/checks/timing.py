@@ -15,7 +15,7 @@ from care_core.ecosystems.ros.messages import GOALS, ROSOUT, STAMPED, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, control_rate, kept_its_rate
 from care_core.ecosystems.timeline import counted
 from care_core.numbers import median
-from care_core.text import shortened
+from care_core.text import log_time, shortened
 
 LIMITS = Limits()
 SHARE = LIMITS.add("messages a second", 0.1, "1/s", "loops that miss now and then are no fault")
@@ -25,6 +25,10 @@ SLOW = LIMITS.add("share of its rate at which a control loop runs", 0.2, "", "a 
 SLOW_SENT = LIMITS.add(
     "the same, by the commands that are recorded", 0.12, "", "a choice: recordings thinned to 2 Hz have 0.2 and more"
 )
+AHEAD_S = LIMITS.add(
+    "stamps ahead of the recording", 1.0, "s", "Nav2 and amcl wait for a transform no longer than that"
+)
+EPOCH_S = LIMITS.add("stamps ahead of a recording by simulated time", 1e9, "s", "31 years: the clock of the day is not")
 COMMANDS_LEAST = LIMITS.add("steps between commands", 20, "", "a choice: fewer tell of no rate")
 _LOOPS = re.compile(
     r"(control|map update|planner) loop missed|missed its desired rate|behavior tree.*(tick|loop) rate", re.IGNORECASE
@@ -55,6 +59,7 @@ def is_late(text: str) -> bool:
 def find(drive: Drive) -> Iterator[Finding]:
     """Clocks that run apart, and messages that loops, transforms or sensors are late."""
     yield from _lags(drive)
+    yield from _ahead(drive)
     yield from _slow_control(drive)
     for pattern, kind, title in _FAMILIES:
         complaints = [message for message in drive.log_messages if _counts(message, pattern)]
@@ -154,6 +159,33 @@ def _lags(drive: Drive) -> Iterator[Finding]:
         evidence=evidence,
         source="header.stamp against times of recording",
         suspect="world" if simulated else "operation",
+        probability=0.8,
+    )
+
+
+def _ahead(drive: Drive) -> Iterator[Finding]:
+    """Stamps of a time at which nothing of it was recorded yet: two computers whose clocks were not set alike. What is
+    played again has stamps of the past."""
+    ahead: dict[str, float] = {}
+    for topic, table in drive.of(*STAMPED):
+        by = np.asarray(table.columns.get(STAMP, ()), np.float64) - table.t if STAMP in table.columns else np.empty(0)
+        known = by[np.isfinite(by)]
+        if len(known) and AHEAD_S < (by_s := float(median(known))) < EPOCH_S:
+            ahead[topic] = by_s
+    if not ahead:
+        return
+    first, *others = sorted(ahead)
+    more = f" and of {counted(len(others), 'more topic')}" if others else ""
+    yield Finding(
+        kind="cpu",
+        title=f"stamps of {first}{more} are {log_time(max(ahead.values()))} ahead of the recording",
+        onset_s=0.0,
+        end_s=drive.duration_s,
+        severity="warning",
+        evidence="the clocks of two computers differ: what one stamps is of the future to the other, which finds no "
+        "transform for it; let one set its clock by the other (chrony)",
+        source="header.stamp against times of recording",
+        suspect="operation",
         probability=0.8,
     )
 
