@@ -422,6 +422,31 @@ def test_the_greatest_speed_that_is_told_lasted(tmp_path: Path) -> None:
     assert "0.5" in said.text.partition("m in all, ")[2]
 
 
+@pytest.mark.parametrize(
+    ("climbs_mps", "other_mps", "told"), [(-15.0, 0.01, True), (-15.0, -5.0, False), (-15.0, 0.0, False)]
+)
+def test_a_height_that_runs_away_is_told_by_another_odometry(
+    climbs_mps: float, other_mps: float, told: bool, tmp_path: Path
+) -> None:
+    class Sinking(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                if name == ODOMETRY:
+                    yield "/odometry/gps", name, time_s, _at_height(message, other_mps * time_s)
+                    yield topic, name, time_s, _at_height(message, climbs_mps * time_s)
+                else:
+                    yield topic, name, time_s, message
+
+    titles = [one.title for one in looked_at(Sinking(), tmp_path).findings]
+    assert any(title.startswith("the height of /wheels/odom runs away") for title in titles) is told
+
+
+def _at_height(odometry: Any, height_m: float) -> Any:
+    place = dataclasses.replace(odometry.pose.pose.position, z=height_m)
+    pose = dataclasses.replace(odometry.pose, pose=dataclasses.replace(odometry.pose.pose, position=place))
+    return dataclasses.replace(odometry, pose=pose)
+
+
 @pytest.mark.parametrize(("ahead_s", "told"), [(20881.0, True), (-20881.0, False), (0.3, False)])
 def test_stamps_of_the_future_are_of_another_clock(ahead_s: float, told: bool, tmp_path: Path) -> None:
     class Ahead(Drive):
