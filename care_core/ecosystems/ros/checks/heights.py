@@ -28,7 +28,7 @@ def find(drive: Drive) -> Iterator[Finding]:
     if ranges[worst] < max(RUNS_M, TIMES * ranges[calmest]):
         return
     yield Finding(
-        kind="localisation",
+        kind="estimator",
         title=f"the height of {worst} runs away: it ranges over {ranges[worst]:.0f} m",
         onset_s=0.0,
         end_s=drive.duration_s,
@@ -39,6 +39,7 @@ def find(drive: Drive) -> Iterator[Finding]:
         ),
         source=f"{worst}: {HEIGHT} against {calmest}",
         suspect="parameter",
+        parameters=("two_d_mode",),
         probability=0.8,
     )
 
