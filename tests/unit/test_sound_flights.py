@@ -298,3 +298,12 @@ def test_a_pack_that_is_not_full_darkens_no_board() -> None:
     (pack,) = [one for one in made.find() if one.title == "the battery was not charged"]
     assert not [one for one in pack.below if one.title.startswith("the autopilot's own supply")]
     assert any(title.startswith("the autopilot's own supply") for title in titles(made))
+
+
+def test_a_barometer_alone_tells_the_height_of_a_flight() -> None:
+    made = Made()
+    for name in ("POS", "CTUN"):
+        del made.table[name]
+    known = made.flight().height
+    assert known is not None
+    assert float(known[1].max()) == pytest.approx(12.0, abs=0.5)

@@ -204,7 +204,7 @@ class Armed(Recorded):
 
     @cached_property
     def _estimate(self) -> tuple[Table, str] | None:
-        return self._first_height(("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"))
+        return self._first_height(("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"))
 
     def _first_height(self, *places: tuple[str, str]) -> tuple[Table, str] | None:
         """The first of these messages and fields that moves."""
