@@ -7,7 +7,16 @@ from collections.abc import Iterable
 
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
 from care_core.diagnose.records import Diagnosis, Fix, helps
-from care_core.ecosystems.findings import IDLED, NOT_FLOWN, STEERED, Finding, FindingKind, every_finding
+from care_core.ecosystems.findings import (
+    IDLED,
+    KILLED,
+    NOT_FLOWN,
+    STEERED,
+    STOPPED,
+    Finding,
+    FindingKind,
+    every_finding,
+)
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, vehicle_of
 from care_core.logs.formats import MAVLINK_TLOG, format_named
@@ -90,6 +99,8 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
     if parts:
         how = "look at what this names" if around.issuperset(parts) else "check on the bench"
         return f"{how}: {listed(parts)}; then try it {trial(run)}"
+    if any(one.title in (KILLED, STOPPED) for one in findings):
+        return f"ask why the motors were cut, and check what the fall broke; then try it {trial(run)}"
     if any(one.title in (IDLED, STEERED) for one in findings):
         return f"look at how it was steered: its throttle stick was down; then try it {trial(run)}"
     misled = [name for name in named if symptoms[name] not in UPSETS]

@@ -7,7 +7,17 @@ import pytest
 from care_core.diagnose.next_step import bench, next_step, trial, was_upset
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.diagnose.verdict import verdict_of
-from care_core.ecosystems.findings import IDLED, NOT_FLOWN, STEERED, TOO_SHORT, Finding, FindingKind, Health
+from care_core.ecosystems.findings import (
+    IDLED,
+    KILLED,
+    NOT_FLOWN,
+    STEERED,
+    STOPPED,
+    TOO_SHORT,
+    Finding,
+    FindingKind,
+    Health,
+)
 from care_core.records import replace
 from care_core.report.document import build_document, remembered_verdict
 from care_core.report.reading import remembered
@@ -98,6 +108,12 @@ def test_no_motor_is_checked_for_a_height_that_was_estimated_wrongly() -> None:
 def test_what_was_steered_into_the_ground_has_no_part_to_check(kind: FindingKind, title: str) -> None:
     steered = Finding(kind, title, 40.0, 40.0, "critical", "", "", probability=0.1, suspect="operation")
     assert next_step(failed(steered), has_failed=True).startswith("look at how it was steered")
+
+
+@pytest.mark.parametrize("title", [KILLED, STOPPED])
+def test_what_somebody_cut_has_no_motor_to_check(title: str) -> None:
+    cut = Finding("crash", title, 40.0, 40.0, "critical", "", "", probability=0.9, suspect="operation")
+    assert next_step(failed(cut), has_failed=True).startswith("ask why the motors were cut, and check what the fall")
 
 
 def test_what_holds_a_vehicle_is_not_on_the_bench() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.coverage import SUM, Samples, doubt
+from care_core.ecosystems.findings import KILLED
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric
 from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.checks.kill_switch import killed_aloft_s
@@ -149,7 +150,7 @@ def _no_crash(flight: Px4Flight, span: Span) -> Check:
     hit, lost = upset.hit(flight), upset.lost_control(flight)
     aloft_m = None if ended_s is None else flight.height_m(ended_s)
     how = (
-        "the kill switch cut the motors in the air" if was_cut
+        KILLED if was_cut
         else f"it hit the ground at {hit.speed_ms:.1f} m/s" if hit is not None and _is_in(span, hit.time_s)
         else "control was lost in the air" if lost is not None and _is_in(span, lost.time_s)
         else f"the failure detector acted at {log_time(detected_s)}" if detected_s is not None

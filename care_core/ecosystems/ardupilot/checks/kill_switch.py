@@ -8,7 +8,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import STOPPED, Finding
 from care_core.logs.base import Wanted
 
 _CHANNELS = range(5, 15)
@@ -31,7 +31,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     if stopped_s is not None and (height_m is None or height_m > _ALOFT_M):
         yield Finding(
             kind="crash",
-            title="the emergency switch stopped the motors in the air",
+            title=STOPPED,
             onset_s=stopped_s,
             end_s=flight.end_s,
             severity="critical",

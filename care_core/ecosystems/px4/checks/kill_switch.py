@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import KILLED, Finding
 from care_core.ecosystems.px4 import attitude
 from care_core.ecosystems.px4.flight import LANDED, MESSAGES, POSITION, SAID_WITHIN_S, Px4Flight, Span
 from care_core.ecosystems.px4.upset import COMBINED, FORCES, falls_after, leans_over_deg
@@ -40,7 +40,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     if killed_s is not None:
         yield Finding(
             kind="crash",
-            title="the kill switch cut the motors in the air",
+            title=KILLED,
             onset_s=killed_s,
             end_s=flight.end_s,
             severity="critical",
