@@ -91,6 +91,11 @@ class _Record(NamedTuple):
     start: int
     end: int
 
+    @property
+    def is_open_chunk(self) -> bool:
+        """A recorder writes the size of a chunk when it closes it: one without any goes on to the end of its bag."""
+        return self.op == _CHUNK and self.end == self.start and self.fields.get(b"compression") == b"none"
+
     def number(self, name: bytes) -> int:
         value = self.fields.get(name, b"")
         if len(value) not in (4, 8):
@@ -110,6 +115,8 @@ def read_contents(bag: FileBytes) -> BagContents:
                 index_pos, connection_count = record.number(b"index_pos"), record.number(b"conn_count")
                 chunk_count = record.number(b"chunk_count")
                 contents.is_encrypted = bool(record.fields.get(b"encryptor"))
+            if not index_pos and record.is_open_chunk:
+                record = record._replace(end=size)
             _take(bag, record, contents)
             chunk_infos += record.op == _CHUNK_INFO
             pos = record.end

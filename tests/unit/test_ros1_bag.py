@@ -219,6 +219,33 @@ def test_unclosed_bag_is_read_and_reported(sample: Path, tmp_path: Path) -> None
     assert "no index" in bag.damage[0].what
 
 
+def chunks_of(raw: bytes) -> list[tuple[int, int]]:
+    """Where the size of each chunk's data stands, and where the data ends."""
+    found, pos = [], len(b"#ROSBAG V2.0\n")
+    while pos < len(raw):
+        data = pos + 4 + struct.unpack_from("<I", raw, pos)[0]
+        end = data + 4 + struct.unpack_from("<I", raw, data)[0]
+        found += [(data, end)] if b"op=\x05" in raw[pos:data] else []
+        pos = end
+    return found
+
+
+def test_what_was_written_of_a_chunk_before_its_recorder_died_is_read(sample: Path, tmp_path: Path) -> None:
+    raw = bytearray(sample.read_bytes())
+    at = raw.index(b"index_pos=") + len(b"index_pos=")
+    raw[at : at + 8] = bytes(8)
+    path = tmp_path / "died.bag.active"
+    for size_at, end in chunks_of(bytes(raw))[:3]:
+        path.write_bytes(raw[:end])
+        known = Ros1Bag(path).read(WANTED)
+        path.write_bytes(raw[:size_at] + bytes(4) + raw[size_at + 4 : end])
+        found = Ros1Bag(path).read(WANTED)
+        assert {topic: len(table) for topic, table in found.items()} == {
+            topic: len(one) for topic, one in known.items()
+        }
+        assert len(found["/imu"]) > 0
+
+
 @pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
 @given(share=st.floats(0.0, 0.999))
 @settings(max_examples=examples(25), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
