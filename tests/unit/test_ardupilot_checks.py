@@ -993,6 +993,15 @@ def test_what_starts_to_turn_against_its_control_spins_and_what_stops_does_not(b
     assert ("it spins against its control" in [one.title for one in made.find()]) is told
 
 
+def test_a_heading_that_swings_against_its_control_does_not_spin() -> None:
+    made = Made()
+    swung = np.where(made.after(40.0, 46.0), 100.0 * np.sin(2 * np.pi * made.t), 0.0)
+    zero = np.zeros_like(made.t)
+    made.table["RATE"] = {"R": zero, "P": zero, "RDes": zero, "PDes": zero, "ROut": zero, "POut": zero,
+                          "Y": swung, "YDes": zero + 200.0, "YOut": np.where(swung != 0, 0.5, 0.0)}  # fmt: skip
+    assert "it spins against its control" not in [one.title for one in made.find()]
+
+
 def test_what_idles_on_the_ground_has_no_weak_motor() -> None:
     made = Made()
     for table in made.table.values():

@@ -188,7 +188,7 @@ def _spins(flight: Flight) -> Iterator[Finding]:
     t, rate, out = table.t, table["Y"], table["YOut"]
     against = (rate * out < 0) & (np.abs(out) > _PUSHES)
     against &= (np.abs(rate - table["YDes"]) > _SPINS_DPS) & during(flight.flown, t)
-    spans = [span for span in lasting(t, against, _SPINS_S) if _speeds_up(t, np.abs(rate), *span)]
+    spans = [span for span in lasting(t, against, _SPINS_S) if _speeds_up(t, -rate * np.sign(out), *span)]
     if spans:
         start, end = spans[0]
         most = float(np.max(np.abs(rate[(t >= start) & (t <= end)])))
@@ -212,7 +212,8 @@ def _spins(flight: Flight) -> Iterator[Finding]:
 
 
 def _speeds_up(t: Floats, rate: Floats, start: float, end: float) -> bool:
-    """Whether a turn gets faster and goes far: one that is only slow to stop gets slower from its first moment on."""
+    """Whether a turn, counted against what the motors are told, gets faster and goes far: one that is only slow to stop
+    gets slower from its first moment on, and one that swings does not go far."""
     inside = (t >= start) & (t <= end)
     begun, most = float(np.interp(start, t, rate)), float(np.max(rate[inside]))
     is_faster = float(np.interp(end, t, rate)) > begun or begun < _BEGINS * most
