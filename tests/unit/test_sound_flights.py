@@ -264,14 +264,19 @@ def test_what_leaned_as_far_to_the_other_side_just_before_lost_no_motor(swung: f
 
 
 @pytest.mark.parametrize(
-    ("follows", "says"), [(True, "it had turned as told until then"), (False, "turning direction")]
-)
-def test_what_turned_as_told_has_no_motor_that_turns_the_wrong_way(follows: bool, says: str) -> None:
+    ("start_s", "follows", "says"),
+    [(16.0, True, "it had held or turned as told until then"), (16.0, False, "turning direction"),
+     (40.0, False, "it had held or turned as told until then")],
+)  # fmt: skip
+def test_what_held_or_turned_as_told_has_no_motor_that_turns_the_wrong_way(
+    start_s: float, follows: bool, says: str
+) -> None:
     made = Made()
     zero = np.zeros_like(made.t)
-    wanted = np.where(made.after(20.0, 24.0), 60.0, 0.0)
-    turns = np.where(made.after(40.0, 60.0), 30.0 + 3.0 * (made.t - 40.0), wanted if follows else 0.0)
-    pushes = np.where(made.after(40.0, 60.0), -0.5, 0.0)
+    wanted = np.where(made.after(11.0, 14.0), 60.0, 0.0)
+    spins = made.after(start_s, start_s + 20.0)
+    turns = np.where(spins, 30.0 + 3.0 * (made.t - start_s), wanted if follows else 0.0)
+    pushes = np.where(spins, -0.5, 0.0)
     made.table["RATE"] = {"R": zero, "P": zero, "RDes": zero, "PDes": zero, "ROut": zero, "POut": zero,
                           "Y": turns, "YDes": wanted, "YOut": pushes}  # fmt: skip
     (spin,) = [one for one in every_finding(made.find()) if one.title == "it spins against its control"]

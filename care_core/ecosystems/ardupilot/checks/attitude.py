@@ -36,6 +36,9 @@ _YAW_LASTS_S = LIMITS.add("shortest time off the heading", 3.0, "s", "a choice")
 _SPINS_DPS = LIMITS.add("turn against its control", 40.0, "deg/s", "a choice: gusts turn it slower")
 _PUSHES = LIMITS.add("output that is to turn it back", 0.2, "of the range", "a choice: less hardly turns it")
 _SPINS_S = LIMITS.add("shortest turn against its control", 2.0, "s", "a choice: a blow is countered sooner")
+_STILL_S = LIMITS.add(
+    "flight that turning directions are right in", 10.0, "s", "a choice: a false one shows in seconds"
+)
 _BEGINS = LIMITS.add("rate at first, of a turn that gets faster", 0.8, "of it", "a choice: noise is less")
 _NEARLY = LIMITS.add("rate off a turn that is followed", 0.5, "of it", "a choice: rates lag as a turn begins")
 _TURNED = LIMITS.add("probability of wrong turning directions", 0.7, "", "a choice: yaw that is spent shows alike")
@@ -192,9 +195,9 @@ def _spins(flight: Flight) -> Iterator[Finding]:
     if spans:
         start, end = spans[0]
         most = float(np.max(np.abs(rate[(t >= start) & (t <= end)])))
-        had_turned = _turned_as_told(flight, table, start)
+        had_turned = _turned_as_told(flight, table, start) or _held_still(flight, table, start)
         why = (
-            ", though it had turned as told until then: something struck or holds it, or a motor gave way"
+            ", though it had held or turned as told until then: something struck or holds it, or a motor gave way"
             if had_turned
             else ": motors or propellers of the wrong turning direction, or a frame type that is not its own"
         )
@@ -226,6 +229,12 @@ def _turned_as_told(flight: Flight, table: Table, until: float) -> bool:
     t, wanted = table.t, table["YDes"]
     followed = (np.abs(wanted) > _SPINS_DPS) & (np.abs(table["Y"] - wanted) < _NEARLY * np.abs(wanted))
     return bool(lasting(t, followed & during(flight.flown, t) & (t < until), _SPINS_S))
+
+
+def _held_still(flight: Flight, table: Table, until: float) -> bool:
+    """Whether it flew for long without turning: with motors that turn the wrong way each touch of its control grows."""
+    still = (np.abs(table["Y"]) < _SPINS_DPS / 2) & during(flight.flown, table.t) & (table.t < until)
+    return bool(lasting(table.t, still, _STILL_S))
 
 
 def _is_a_turn(off: Floats) -> bool:
