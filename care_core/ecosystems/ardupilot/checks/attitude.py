@@ -191,10 +191,11 @@ def _spins(flight: Flight) -> Iterator[Finding]:
     t, rate, out = table.t, table["Y"], table["YOut"]
     against = (rate * out < 0) & (np.abs(out) > _PUSHES)
     against &= (np.abs(rate - table["YDes"]) > _SPINS_DPS) & during(flight.flown, t)
-    spans = [span for span in lasting(t, against, _SPINS_S) if _speeds_up(t, -rate * np.sign(out), *span)]
+    turn = -rate * np.sign(out)
+    spans = [span for span in lasting(t, against, _SPINS_S) if _speeds_up(t, turn, *span)]
     if spans:
         start, end = spans[0]
-        most = float(np.max(np.abs(rate[(t >= start) & (t <= end)])))
+        most = float(np.max(turn[against & (t >= start) & (t <= end)]))
         had_turned = _turned_as_told(flight, table, start) or _held_still(flight, table, start)
         why = (
             ", though it had held or turned as told until then: something struck or holds it, or a motor gave way"
