@@ -33,6 +33,8 @@ _FEWEST, _TIMES = 10, 10.0
 """A pause is a closed logger where it is so many times what usually lies between two records."""
 _SPOOLS_S, _NO_CLIMB_M = 1.5, 1.0
 """No copter climbs so far from one record to the next so shortly after it was armed: its motors still spool up."""
+_ESTIMATES: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt")}
+"""Where the vehicle writes the height that it estimates; the barometer counts where it writes none."""
 _NEAR_HOME_M = 50.0
 _ALIVE_M, _ON_GROUND_M, _APART_M = 0.05, 1.2, 3.0
 """A barometer that moves by more lives, and by less than the second on the ground, propellers and all."""
@@ -204,7 +206,10 @@ class Armed(Recorded):
 
     @cached_property
     def _estimate(self) -> tuple[Table, str] | None:
-        return self._first_height(("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"))
+        places = [(name, field) for name, fields in _ESTIMATES.items() for field in fields]
+        recorded = self.tables(_ESTIMATES)
+        is_dead = any(name in recorded and field in recorded[name].columns for name, field in places)
+        return self._first_height(*places) or (None if is_dead else self._first_height(("BARO", "Alt")))
 
     def _first_height(self, *places: tuple[str, str]) -> tuple[Table, str] | None:
         """The first of these messages and fields that moves."""

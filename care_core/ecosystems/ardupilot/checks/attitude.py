@@ -192,8 +192,13 @@ def _spins(flight: Flight) -> Iterator[Finding]:
     against = (rate * out < 0) & (np.abs(out) > _PUSHES)
     against &= (np.abs(rate - table["YDes"]) > _SPINS_DPS) & during(flight.flown, t)
     turn = -rate * np.sign(out)
-    spans = [span for span in lasting(t, against, _SPINS_S) if _speeds_up(t, turn, *span)]
-    if spans:
+    spans = [
+        (start, end)
+        for start, end in lasting(t, against & (turn > _SPINS_DPS), _SPINS_S)
+        if np.interp(end, t, turn) > np.interp(start, t, turn)
+    ]
+    slow = lasting(t, against, _SPINS_S)
+    if spans := spans or [span for span in slow if _speeds_up(t, turn, *span) and _is_level(flight, span)]:
         start, end = spans[0]
         most = float(np.max(turn[against & (t >= start) & (t <= end)]))
         had_turned = _turned_as_told(flight, table, start) or _held_still(flight, table, start)
@@ -223,6 +228,15 @@ def _speeds_up(t: Floats, rate: Floats, start: float, end: float) -> bool:
     is_faster = float(np.interp(end, t, rate)) > begun or begun < _BEGINS * most
     turned = float(np.sum(rate[inside][1:] * np.diff(t[inside])))
     return is_faster and most > _SPINS_DPS and turned > _SPINS_DPS * _SPINS_S
+
+
+def _is_level(flight: Flight, span: Span) -> bool:
+    """Whether roll and pitch follow all the while: what swings or tumbles has no motors left for its heading."""
+    if flight.lean_error is None:
+        return False
+    t, error = flight.lean_error
+    off = error[(t >= span[0]) & (t <= span[1])]
+    return len(off) > 0 and float(np.max(off)) < FAR_DEG
 
 
 def _turned_as_told(flight: Flight, table: Table, until: float) -> bool:
