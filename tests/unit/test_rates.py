@@ -25,12 +25,16 @@ def read(rate: float, output: float, *, with_gyros: bool = True) -> tuple[float,
 
 @pytest.mark.parametrize("with_gyros", [True, False])
 def test_rates_and_outputs_of_any_release_are_read_alike(with_gyros: bool) -> None:
-    assert read(100.0, 4500.0, with_gyros=with_gyros) == pytest.approx((3.0, 0.01), rel=1e-3)
+    assert read(100.0, 9000.0, with_gyros=with_gyros) == pytest.approx((3.0, 0.02), rel=1e-3)
     assert read(1.0, 1.0, with_gyros=with_gyros) == pytest.approx((3.0, 0.01), rel=1e-3)
 
 
 def test_a_rate_that_the_gyros_say_as_well_is_one_in_degrees() -> None:
-    assert read(1.0, 4500.0)[0] == pytest.approx(3.0, rel=1e-3)
+    assert read(1.0, 9000.0)[0] == pytest.approx(3.0, rel=1e-3)
+
+
+def test_a_controller_that_asks_for_more_than_there_is_writes_no_other_unit() -> None:
+    assert read(1.0, 2200.0) == pytest.approx((3.0, 22.0), rel=1e-3)
 
 
 def test_other_messages_are_left_alone() -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from care_core.ecosystems.vehicles.vehicle import vehicle_of
 from care_core.logs.base import Log, Table, Wanted
 from care_core.numbers import Floats, quantile
 from care_core.records import Record
@@ -22,8 +23,10 @@ _RATES, _OUTPUTS = ("R", "RDes", "P", "PDes", "Y", "YDes"), ("ROut", "POut", "YO
 _TOLD: Wanted = {_MESSAGE: ("R", "P", *_OUTPUTS)}
 _GYROS: Wanted = {"IMU": ("GyrX", "GyrY")}
 _CENTI, _OUTPUT = 0.01, 1 / 4500
-_OVER = 2.0
-"""An output beyond all that the motors have, 1, is one of 4500."""
+_OVER = 50.0
+"""An output so far beyond all that the motors have, 1, is one of 4500: a copter that tumbles asks for 22."""
+_IN_DEGREES = (3, 4)
+"""The first release of ArduCopter that writes degrees."""
 _FROM, _TO = 30.0, 300.0
 """By what factor hundredths of a degree are more than degrees: the gyro's spread and the rate's differ by less."""
 
@@ -52,8 +55,13 @@ class _InDegrees(Record, eq=False, dict=True):
     @cached_property
     def _scales(self) -> tuple[float, float]:
         """Degrees a second of one unit of a rate, and the share of all the motors have of one unit of an output."""
+        version = vehicle_of(self.log.facts, self.log.settings()).version
         told = self.log.read(_TOLD).get(_MESSAGE)
-        if told is None or max(_spreads(told, _OUTPUTS)) <= _OVER:
+        if (
+            told is None
+            or (version is not None and version[:2] >= _IN_DEGREES)
+            or max(_spreads(told, _OUTPUTS)) <= _OVER
+        ):
             return 1.0, 1.0
         gyros = self.log.read(_GYROS).get("IMU")
         turned = [] if gyros is None else np.degrees(_spreads(gyros, _GYROS["IMU"])).tolist()
