@@ -317,3 +317,19 @@ def test_what_the_log_shows_is_changed_without_odds_where_no_objective_could_be_
     assert fix.odds is None
     for other in (None, replace(lead, is_found=False), replace(lead, is_advised=False)):
         assert shown_fix(other, rover) is None
+
+
+def test_a_value_on_the_side_that_nobody_flew_counts_by_how_far_it_is_off() -> None:
+    """The offsets of a compass that is calibrated: of a plane -400 was flown, and lost."""
+    (flown,) = flights_of("COMPASS_OFS_Y", "plane")
+    assert flown.is_lost
+    assert flown.value == -400.0
+    plane = Vehicle("plane", "fixed wing", "ArduPlane V4.5.4", (4, 5, 4))
+    strayed = Signs(frozenset({"strays"}), frozenset({"strays"}))
+
+    def weight(value: float) -> float:
+        off = list(off_parameters(setting("COMPASS_OFS_Y", value, 0.0), plane, (), None))
+        return sum(one.weight for one in outside_suspects(off, strayed, EVERYTHING, "plane"))  # type: ignore[arg-type]
+
+    assert weight(13.0) < 0.05
+    assert weight(390.0) > 5 * weight(13.0)

@@ -122,16 +122,17 @@ def _wrong(one: OffParameter, flights: Sequence[Flight], blocks: Mapping[Role, i
 
 def _lost(one: OffParameter, flights: Sequence[Flight]) -> float:
     """Probability that the value loses a mission, by the screening flights: at its value, or as much of the way to the
-    bound that was lost as it is off."""
+    bound that was lost as it is off, to that of the other side where this one was not flown."""
     reference = flights[0].reference
     if math.isclose(reference, one.value, rel_tol=1e-4, abs_tol=1e-6):
         return HARMLESS  # every flight had it
     if same := _at(one, flights):
         return _share(same)
-    side = [flight for flight in flights if (flight.value - reference) * (one.value - reference) > 0]
-    if one.is_code or not side:
+    if one.is_code:
         return _share(flights)
-    return max(HARMLESS, *(min(1.0, _way(one.value, flight)) * flight.is_lost for flight in side))
+    side = [flight for flight in flights if (flight.value - reference) * (one.value - reference) > 0]
+    ways = [(min(1.0, abs(_way(one.value, flight))), flight.is_lost) for flight in side or flights]
+    return max(HARMLESS, *(way * is_lost for way, is_lost in ways))
 
 
 def _at(one: OffParameter, flights: Sequence[Flight]) -> list[Flight]:
