@@ -329,7 +329,8 @@ def test_a_value_on_the_side_that_nobody_flew_counts_by_how_far_it_is_off() -> N
 
     def weight(value: float) -> float:
         off = list(off_parameters(setting("COMPASS_OFS_Y", value, 0.0), plane, (), None))
-        return sum(one.weight for one in outside_suspects(off, strayed, EVERYTHING, "plane"))  # type: ignore[arg-type]
+        found = outside_suspects(off, strayed, EVERYTHING, "plane")  # type: ignore[arg-type]
+        return sum(one.weight for one in found)
 
     assert weight(13.0) < 0.05
     assert weight(390.0) > 5 * weight(13.0)
