@@ -22,6 +22,7 @@ from care_core.ecosystems.ardupilot.measures.requested import (
     home_of,
     items_begun,
     mission_held,
+    number_set,
     requested_mission,
 )
 from care_core.ecosystems.ardupilot.measures.samples import samples
@@ -284,7 +285,7 @@ def _phases(
     homeward, way = _homeward(mission, started), mission.shared(requested_mission)
     returns = isinstance(way, Unavailable) or way.ending == "return"
     if homeward is not None and track is not None:
-        slow_below_m = _number(mission.settings.get("LAND_ALT_LOW"), 1000.0) / 100
+        slow_below_m = number_set(mission, "LAND_ALT_LOW", 1000.0) / 100
         home = phases_home(track, homeward, mission.end_s, slow_below_m, returns=returns)
         phases.update({(name, 0): phase for name, phase in home.items()})
     return phases
@@ -324,7 +325,3 @@ def _homeward(mission: Mission, started: Mapping[int, float]) -> float | None:
     homeward = (mode.start_s for mode in modes_in_force(mission) if mode.way in ("return", "land"))
     times += [t for t in homeward if t >= mission.start_s]
     return min(times, default=None)
-
-
-def _number(value: float | str | None, default: float) -> float:
-    return float(value) if isinstance(value, (int, float)) else default

@@ -130,17 +130,18 @@ def _circle_s(mission: Mission) -> float:
     """How long a copter takes for one circle, by CIRCLE_RATE in degrees a second; 0 of others."""
     if flight_of(mission).mode_kind not in ("copter", "heli"):
         return 0.0
-    rate = _setting(mission, "CIRCLE_RATE", _CIRCLE_RATE)
+    rate = number_set(mission, "CIRCLE_RATE", _CIRCLE_RATE)
     return 360.0 / abs(rate) if rate else 0.0
 
 
 def _airspeed_ms(mission: Mission) -> float:
     """The airspeed at which a plane flies that is not told otherwise."""
-    older = _setting(mission, "TRIM_ARSPD_CM", _AIRSPEED_MS * 100.0) / 100.0
-    return max(_setting(mission, "AIRSPEED_CRUISE", older), 1.0)
+    older = number_set(mission, "TRIM_ARSPD_CM", _AIRSPEED_MS * 100.0) / 100.0
+    return max(number_set(mission, "AIRSPEED_CRUISE", older), 1.0)
 
 
-def _setting(mission: Mission, name: str, default: float) -> float:
+def number_set(mission: Mission, name: str, default: float) -> float:
+    """The number that a parameter is set to, or what it is as shipped."""
     value = mission.settings.get(name, default)
     return float(value) if isinstance(value, (int, float)) else default
 

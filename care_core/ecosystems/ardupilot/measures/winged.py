@@ -31,6 +31,7 @@ from care_core.ecosystems.ardupilot.measures.requested import (
     ITEMS,
     home_of,
     mission_held,
+    number_set,
     place_of,
     requested_mission,
 )
@@ -127,7 +128,7 @@ def legs_of(mission: Mission) -> Legs | Unavailable:
     numbers = held.waypoints[: _before_landing(held, flown.route, flown.end)]
     corners: list[Corner] = []
     legs: dict[int, Leg] = {}
-    for number, corner in _corners(held, home, _limit(mission, "WP_LOITER_RAD", _LOITER_RADIUS_M)):
+    for number, corner in _corners(held, home, number_set(mission, "WP_LOITER_RAD", _LOITER_RADIUS_M)):
         if numbers and number <= numbers[-1]:
             if number in numbers[1:]:
                 legs[numbers.index(number) + 1] = Leg(corners[-1], corner)
@@ -251,7 +252,7 @@ _of_legs("climb_error", _CLIMB, "m/s", "Wanted minus flown climb rate of a plane
 _of_legs("plane_throttle", {"CTUN": ("ThO",)}, "%", "Throttle of a plane.", lambda t, _m, _a: t["ThO"], stat="mean")
 _of_legs("plane_throttle_saturation", {"CTUN": ("ThO",)}, "",
          "Share of the time in which a plane's throttle is at THR_MAX.",
-         lambda t, m, _a: (t["ThO"] >= _limit(m, "THR_MAX", 100.0) - 1.0).astype(float), stat="mean")  # fmt: skip
+         lambda t, m, _a: (t["ThO"] >= number_set(m, "THR_MAX", 100.0) - 1.0).astype(float), stat="mean")  # fmt: skip
 _of_legs("surface_output", _SURFACES, "", "How far the ailerons or the elevator are out, as a share of their travel.",
          lambda t, _m, a: _surface(t, a), stat="rms", args=_AXIS)  # fmt: skip
 _of_legs("surface_saturation", _SURFACES, "", "Share of the time in which ailerons or elevator are at their stop.",
@@ -260,11 +261,6 @@ _of_legs("bank_angle", {"ATT": ("Roll",)}, "deg", "Bank of a plane.", lambda t, 
 _of_legs("plane_pitch", {"ATT": ("Pitch",)}, "deg", "Pitch of a plane.", lambda t, _m, _a: t["Pitch"], stat="mean")
 _of_legs("wind_speed", _WIND, "m/s", "Wind as the estimator has it.",
          lambda t, _m, _a: np.hypot(t["VWN"], t["VWE"]), stat="mean")  # fmt: skip
-
-
-def _limit(mission: Mission, name: str, default: float) -> float:
-    value = mission.settings.get(name, default)
-    return float(value) if isinstance(value, (int, float)) else default
 
 
 @extractor(
