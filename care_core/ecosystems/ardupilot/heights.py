@@ -8,17 +8,16 @@ decide, and its own word only where there is none.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.units import InUnits
 from care_core.logs.base import Log, Table, Wanted
 from care_core.numbers import Floats
-from care_core.records import Record
 
 _MESSAGE, _FIELD = "POS", "RelHomeAlt"
-_OTHERS: Wanted = {"BARO": ("Alt",), "CTUN": ("BAlt", "BarAlt", "Alt"), "GPS": ("Alt",), _MESSAGE: ("Alt", _FIELD)}
+_OWN: Wanted = {_MESSAGE: (_FIELD,)}
+_OTHERS: Wanted = {"BARO": ("Alt",), "CTUN": ("BAlt", "BarAlt", "Alt"), "GPS": ("Alt",), _MESSAGE: ("Alt",)}
 _DECLARED: Wanted = {
     "FMT": ("Type", "Name", "Format", "Columns"), "FMTU": ("FmtType", "UnitIds", "MultIds"), "MULT": ("Id", "Mult"),
 }  # fmt: skip
@@ -35,39 +34,24 @@ _FROM, _TO = 30.0, 300.0
 
 def in_metres(log: Log) -> Log:
     """The log with the height above home in metres."""
-    return _InMetres(log)
+    return InUnits(log, _MESSAGE, _factors)
 
 
-class _InMetres(Record, eq=False, dict=True):
-    log: Log
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.log, name)
-
-    def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        tables = self.log.read(wanted)
-        table = tables.get(_MESSAGE)
-        if table is None or _FIELD not in table.columns or _range(table, _FIELD) <= _DOUBTFUL or self._scale == 1:
-            return tables
-        columns = {name: table[name] for name in table.columns}
-        columns[_FIELD] = columns[_FIELD] * self._scale
-        return {**tables, _MESSAGE: Table(table.t, columns)}
-
-    @cached_property
-    def _scale(self) -> float:
-        """Metres of one unit of the height above home."""
-        tables = self.log.read(_OTHERS)
-        height = _range(tables[_MESSAGE], _FIELD)
-        ranges = (
-            _range(tables[name], field)
-            for name, fields in _OTHERS.items()
-            for field in fields
-            if name in tables and field in tables[name].columns and field != _FIELD
-        )
-        known = [size for size in ranges if size > _RISE_M]
-        if known:
-            return _CENTI if any(_FROM < height / size < _TO for size in known) else 1.0
-        return _CENTI if _is_declared(self.log) else 1.0
+def _factors(log: Log) -> Mapping[str, float]:
+    """Metres of one unit of the height above home, where that is another."""
+    own = log.read(_OWN).get(_MESSAGE)
+    if own is None or _FIELD not in own.columns or (height := _range(own, _FIELD)) <= _DOUBTFUL:
+        return {}
+    tables = log.read(_OTHERS)
+    ranges = (
+        _range(tables[name], field)
+        for name, fields in _OTHERS.items()
+        for field in fields
+        if name in tables and field in tables[name].columns
+    )
+    known = [size for size in ranges if size > _RISE_M]
+    is_centi = any(_FROM < height / size < _TO for size in known) if known else _is_declared(log)
+    return {_FIELD: _CENTI} if is_centi else {}
 
 
 def _range(table: Table, field: str) -> float:

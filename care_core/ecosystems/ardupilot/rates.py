@@ -8,15 +8,13 @@ the rates: the two changed one after the other.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.units import InUnits
 from care_core.ecosystems.vehicles.vehicle import vehicle_of
 from care_core.logs.base import Log, Table, Wanted
 from care_core.numbers import Floats, quantile
-from care_core.records import Record
 
 _MESSAGE = "RATE"
 _RATES, _OUTPUTS = ("R", "RDes", "P", "PDes", "Y", "YDes"), ("ROut", "POut", "YOut")
@@ -33,41 +31,20 @@ _FROM, _TO = 30.0, 300.0
 
 def in_degrees(log: Log) -> Log:
     """The log with rates in degrees a second, and their outputs from -1 to 1."""
-    return _InDegrees(log)
+    return InUnits(log, _MESSAGE, _factors)
 
 
-class _InDegrees(Record, eq=False, dict=True):
-    log: Log
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.log, name)
-
-    def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        tables = self.log.read(wanted)
-        table = tables.get(_MESSAGE)
-        if table is None or self._scales == (1.0, 1.0):
-            return tables
-        rate, output = self._scales
-        scales = {**dict.fromkeys(_RATES, rate), **dict.fromkeys(_OUTPUTS, output)}
-        columns = {name: table[name] * scales[name] if name in scales else table[name] for name in table.columns}
-        return {**tables, _MESSAGE: Table(table.t, columns)}
-
-    @cached_property
-    def _scales(self) -> tuple[float, float]:
-        """Degrees a second of one unit of a rate, and the share of all the motors have of one unit of an output."""
-        version = vehicle_of(self.log.facts, self.log.settings()).version
-        told = self.log.read(_TOLD).get(_MESSAGE)
-        if (
-            told is None
-            or (version is not None and version[:2] >= _IN_DEGREES)
-            or max(_spreads(told, _OUTPUTS)) <= _OVER
-        ):
-            return 1.0, 1.0
-        gyros = self.log.read(_GYROS).get("IMU")
-        turned = [] if gyros is None else np.degrees(_spreads(gyros, _GYROS["IMU"])).tolist()
-        ratios = [rate / gyro for rate, gyro in zip(_spreads(told, ("R", "P")), turned, strict=False) if gyro > 0]
-        is_centi = not ratios or any(_FROM < ratio < _TO for ratio in ratios)
-        return _CENTI if is_centi else 1.0, _OUTPUT
+def _factors(log: Log) -> Mapping[str, float]:
+    """Degrees a second of one unit of each rate, and the share of all the motors have of one unit of each output."""
+    version = vehicle_of(log.facts, log.settings()).version
+    told = log.read(_TOLD).get(_MESSAGE)
+    if told is None or (version is not None and version[:2] >= _IN_DEGREES) or max(_spreads(told, _OUTPUTS)) <= _OVER:
+        return {}
+    gyros = log.read(_GYROS).get("IMU")
+    turned = [] if gyros is None else np.degrees(_spreads(gyros, _GYROS["IMU"])).tolist()
+    ratios = [rate / gyro for rate, gyro in zip(_spreads(told, ("R", "P")), turned, strict=False) if gyro > 0]
+    is_centi = not ratios or any(_FROM < ratio < _TO for ratio in ratios)
+    return {**(dict.fromkeys(_RATES, _CENTI) if is_centi else {}), **dict.fromkeys(_OUTPUTS, _OUTPUT)}
 
 
 def _spreads(table: Table, fields: Sequence[str]) -> list[float]:
