@@ -222,6 +222,7 @@ class Browser:
         return event
 
 
+@pytest.mark.long
 def test_a_browser_walks_to_the_causes(address: str, tmp_path: Path) -> None:
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
