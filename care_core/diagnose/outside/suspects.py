@@ -164,10 +164,11 @@ def _is_alike(flight: Flight, signs: Signs) -> bool:
 
 def _shows(one: OffParameter, flights: Sequence[Flight], like: Sequence[Flight], signs: Signs) -> float:
     """Probability that a mission which the parameter loses fails in this way, by flights and by the causal map where
-    nobody flew the value."""
+    nobody flew the value, or not with such a frame."""
     lost = sum(flight.is_lost for flight in flights)
     flown = (len(like) + UNLIKELY) / (lost + 0.5) if lost else 0.0
-    return flown if _at(one, flights) else max(flown, _answers(one.meaning, signs))
+    is_known = bool(_at(one, flights)) and one.meaning.part != "frame"
+    return flown if is_known else max(flown, _answers(one.meaning, signs))
 
 
 def _answers(meaning: Meaning, signs: Signs) -> float:

@@ -47,10 +47,10 @@ from care_core.ecosystems.ardupilot.checks.wings import (
     airspeed,
     lift,
     propeller,
-    rudder,
     surfaces,
     time_to_climb,
     transition,
+    trims,
 )
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
@@ -68,7 +68,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     lift.CHECK,
     propeller.CHECK,
     surfaces.CHECK,
-    rudder.CHECK,
+    trims.CHECK,
     transition.CHECK,
     time_to_climb.CHECK,
     attitude.CHECK,

@@ -12,23 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.wings import straight
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Span, during, runs
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.logs.base import Wanted
+from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import median
 
-READS: Wanted = {
-    "AETR": ("Ail", "Elev"),
-    "PIDR": ("Tar", "Act"),
-    "PIDP": ("Tar", "Act"),
-    "ATT": ("Roll", "Pitch"),
-    "GPS": ("Spd",),
-}
+READS: Wanted = merge_needs(
+    (
+        straight.READS,
+        {"AETR": ("Ail", "Elev"), "PIDR": ("Tar", "Act"), "PIDP": ("Tar", "Act"), "ATT": ("Roll", "Pitch")},
+    )
+)
 
-LIMITS = Limits()
+LIMITS = Limits(straight.LIMITS)
 _FLIES_MS = LIMITS.add("speed at which surfaces act", 7.0, "m/s", "a choice: slower, the air hardly moves them")
 _HIGH_M = LIMITS.add("height at which surfaces are looked at", 10.0, "m", "a choice: a roll-out turns no plane")
 _OUT = LIMITS.add("surface that is out", 0.25, "", "a choice, as a share of its travel")
@@ -76,6 +76,8 @@ class _Flown(NamedTuple):
     t: Floats
     out: Floats
     """Share of its travel, up and right positive."""
+    middle: float
+    """What it is out by in straight flight: a trim that is off shows there."""
     wanted: Floats
     rate: Floats
     angle: Floats
@@ -104,7 +106,9 @@ def _flown(flight: Flight, surface: _Surface) -> _Flown | None:
         return None
     out = np.interp(t, outs.t, outs[surface.output]) / _FULL
     angle = np.interp(t, leans.t, np.degrees(np.unwrap(np.radians(leans[surface.attitude]))))
-    return _Flown(t[acts], out[acts], rates["Tar"][acts], rates["Act"][acts], angle[acts])
+    level = straight.straight(flight)
+    middle = straight.held_at(level, outs, surface.output) / _FULL if len(level) else 0.0
+    return _Flown(t[acts], out[acts], middle, rates["Tar"][acts], rates["Act"][acts], angle[acts])
 
 
 def _wrong_way(surface: _Surface, flown: _Flown) -> Finding | None:
@@ -138,7 +142,8 @@ _WAYS = {
 
 def _turns_against(flown: _Flown, side: float) -> Iterator[tuple[float, float, float, float]]:
     """Start, end, side and degrees of each turn against a surface that is out to one side."""
-    against = (side * flown.out > _OUT) & (side * flown.rate < -_AGAINST_DPS)
+    is_out = (side * flown.out > _OUT) & (side * (flown.out - flown.middle) > _OUT)
+    against = is_out & (side * flown.rate < -_AGAINST_DPS)
     against &= side * (flown.wanted - flown.rate) > 0
     for start, end in runs(flown.t, against):
         held = during([(start, end)], flown.t)
