@@ -20,18 +20,20 @@ from care_core.diagnose.fixes import (
 )
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.next_step import KEPT
-from care_core.diagnose.outside.change import Advisable, check_first, outside_fix
+from care_core.diagnose.outside.change import Advisable, check_first, outside_fix, refused_beside
 from care_core.diagnose.parts import mend_first, set_wrong, was_refused
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Fault, Fix, Hypothesis
 from care_core.diagnose.tell_more import AllBack
 from care_core.diagnose.worth import falls_short, is_worth, nearest, no_stand_out, promised, unrecorded, untried
-from care_core.ecosystems.findings import Finding, every_finding
+from care_core.ecosystems.findings import Finding, Severity, every_finding
 from care_core.records import Record, replace
 
 BESIDE = 0.3
 """Share of the leading parameter's probability from which an option is changed with it."""
+MOST_LIKELY = 0.5
+"""Probability of a parameter over which it is likelier than all else together."""
 MIN_PROBABILITY = 0.2
 """Best probability below which the engine abstains: a confident wrong answer costs a field day."""
 
@@ -45,17 +47,41 @@ class Advised(Record):
 
 
 def of_outside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothesis], promise: Promise) -> Advised:
-    """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside it.
-    A vehicle that never armed has its mission still before it: then the odds are those of the mission, too."""
+    """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside
+    it."""
     if not lead.is_advised:
         return Advised((), check_first(lead))
     query = failed.query
     beside = _beside(lead, failed, hypotheses, promise)
-    odds = promise.without(lead.name, {**query.config, **beside})
-    if was_refused(failed.findings):
-        odds *= float(replace(query, observed={}, repeats=()).probability([query.config])[0])
+    odds = _without(failed, promise, [lead.name], beside)
     changes = to_fix(query, beside, odds).changes if beside else ()
     return Advised((outside_fix(lead, odds, failed.run, changes),), None, lead.why)
+
+
+def with_refusals(advised: Advised, failed: FailedRun, promise: Promise) -> Advised:
+    """The advised change with what else keeps the vehicle from arming: two checks that refuse it both have to pass."""
+    if advised.abstained is not None or not advised.fixes:
+        return advised
+    fix = advised.fixes[0]
+    named = {change.option.name: change.suggested for change in fix.changes}
+    more = refused_beside(failed.findings, failed.run, {*named, *failed.query.config})
+    if not more:
+        return advised
+    outside = [*(named.keys() - failed.query.config), *(change.option.name for change in more)]
+    options = {name: value for name, value in named.items() if name in failed.query.config}
+    odds = _without(failed, promise, outside, options)
+    return replace(advised, fixes=(replace(fix, changes=(*fix.changes, *more), p_fixed=odds), *advised.fixes[1:]))
+
+
+def _without(failed: FailedRun, promise: Promise, outside: Collection[str], options: Assignment) -> float:
+    """Probability that the next run meets every limit with these options changed, and parameters right that the profile
+    does not know. A vehicle that was refused has its mission still before it."""
+    query = failed.query
+    config = {**query.config, **options}
+    odds = promise.without(outside, config)
+    if was_refused(failed.findings):
+        odds *= float(replace(query, observed={}, repeats=()).probability([config])[0])
+    return odds
 
 
 def _beside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothesis], promise: Promise) -> dict[str, float]:
@@ -67,8 +93,10 @@ def _beside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothesis]
     free = {name: value for name in sorted(off) if query.variables[name].accepts(value := query.reference[name])}
     chosen = {name: value for name, value in free.items() if name in likely}
     while rest := free.keys() - chosen:
-        now = promise.without(lead.name, {**query.config, **chosen})
-        odds = {name: promise.without(lead.name, {**query.config, **chosen, name: free[name]}) for name in sorted(rest)}
+        now = promise.without([lead.name], {**query.config, **chosen})
+        odds = {
+            name: promise.without([lead.name], {**query.config, **chosen, name: free[name]}) for name in sorted(rest)
+        }
         best = max(odds, key=lambda name: odds[name])
         if odds[best] < now + GAIN_FOR_ONE_MORE:
             break
@@ -126,13 +154,16 @@ def _fixes(failed: FailedRun, options: Collection[str], held: Collection[str], p
     found = _as_promised(search(failed.query, free), promise)
     if not found:
         return []
-    chosen = smallest_good(found)
-    others = [found[i] for i in range(len(found)) if i != chosen and abs(i - chosen) == 1]
-    without = [name for name in free if name not in found[chosen][0]]
-    detour = _as_promised(search(failed.query, without), promise)
-    others += [detour[smallest_good(detour)]] if detour else []
-    useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
-    ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
+    at = smallest_good(found)
+    chosen, others = found[at], [found[i] for i in (at - 1, at + 1) if 0 <= i < len(found)]
+    without = [name for name in free if name not in chosen[0]]
+    if detour := _as_promised(search(failed.query, without), promise):
+        way = detour[smallest_good(detour)]
+        # the search goes by this run, the promise by the next one: it may prefer the other way
+        is_better = way[1] > chosen[1] and len(way[0]) <= len(chosen[0])
+        chosen, others = (way, [chosen, *others]) if is_better else (chosen, [*others, way])
+    useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, chosen)]
+    ranked = [chosen, *useful[:MAX_ALTERNATIVES]]
     fixes = [to_fix(failed.query, *settled(failed.query, assignment)) for assignment, _probability in ranked]
     return [fix for i, fix in enumerate(fixes) if fix.changes not in [earlier.changes for earlier in fixes[:i]]]
 
@@ -227,10 +258,14 @@ def _resets(failed: FailedRun, faults: tuple[Fault, ...]) -> list[Fix]:
 
 
 def _shown_by_run(failed: FailedRun, hypotheses: Sequence[Hypothesis]) -> Fix | None:
-    """The parameters that a critical finding of this run names, back at their reference: what it shows is worth a
-    change where training says little of it, though nothing says what that promises. None where none stands above
-    chance."""
-    query, (title, named) = failed.query, _named_by_run(failed)
+    """The parameters that a finding of this run names, back at their reference: what it shows is worth a change where
+    training says little of it, though nothing says what that promises. None where none stands above chance; of a
+    warning they have to be likelier than all else."""
+    query, (title, named) = failed.query, _named_by_run(failed, "critical")
+    if not named:
+        title, named = _named_by_run(failed, "warning")
+        acts = {one.name for one in hypotheses if one.what == "parameter" and one.probability > MOST_LIKELY}
+        named = named if acts & set(named) else ()
     if not named or failed.profile.schema.learned_elsewhere:
         return None
     chance = sum(one.probability for one in hypotheses if one.what == "chance")
@@ -242,10 +277,10 @@ def _shown_by_run(failed: FailedRun, hypotheses: Sequence[Hypothesis]) -> Fix | 
     return replace(fix, predicted={}, shown_by=title)
 
 
-def _named_by_run(failed: FailedRun) -> tuple[str, Collection[str]]:
-    """The first critical finding that names options off their reference, by the profile's rules or by itself."""
-    for finding in (one for one in failed.findings if one.severity == "critical" and set_wrong(one)):
-        said = (e.options for e in failed.run.evidence if e.kind == "found" and e.text.startswith(f"{finding.title}:"))
+def _named_by_run(failed: FailedRun, severity: Severity) -> tuple[str, Collection[str]]:
+    """The first finding so severe that names options off their reference, by the profile's rules or by itself."""
+    for finding in (one for one in failed.findings if one.severity == severity and set_wrong(one)):
+        said = (e.options for e in failed.run.evidence if e.text.startswith(f"{finding.title}:"))
         named = next(said, finding.parameters)
         if named and failed.off.issuperset(named):
             return finding.title, named

@@ -86,11 +86,17 @@ def as_in_fix(failed: FailedRun, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
     return tuple(map(as_in_fix, fault.causes))
 
 
-def as_ranked(faults: Sequence[Fault], failure: NoisyOr) -> tuple[Fault, ...]:
-    """The faults with their causes in the order of the hypotheses: which of them acted is told in one order alone."""
+def as_ranked(faults: Sequence[Fault], failure: NoisyOr, least: float = 0.0) -> tuple[Fault, ...]:
+    """The faults with their causes in the order of the hypotheses: which of them acted is told in one order alone.
+
+    Args:
+        least: probability that a cause acted from which it is told at all.
+    """
 
     def ranked(causes: tuple[Cause, ...]) -> tuple[Cause, ...]:
-        order = sorted(causes, key=lambda one: (one.is_lead, -round(failure.acts(("parameter", one.option.name)), 2)))
+        acted = [(round(failure.acts(("parameter", one.option.name)), 2), one) for one in causes]
+        told = [(acts, one) for acts, one in acted if acts >= least]
+        order = [one for _, one in sorted(told, key=lambda pair: (pair[1].is_lead, -pair[0]))]
         return tuple(replace(one, rank=rank) for rank, one in enumerate(order, start=1))
 
     return tuple(replace(fault, causes=ranked(fault.causes)) for fault in faults)

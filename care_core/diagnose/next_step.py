@@ -141,8 +141,9 @@ def _undone(diagnosis: Diagnosis) -> str:
     named = first if first is not None and first.what == "parameter" and first.name else None
     if named is not None and _is_kept(named.name, diagnosis):
         return f"let {named.name} change as well: without it nothing is likely enough"
-    if named is not None and any(one.title.startswith(named.name) or _names(one, named.name) for one in findings):
-        return f"put {named.name} back as the findings say"
+    said = None if named is None else next((one for one in findings if _says(one, named.name)), None)
+    if named is not None and said is not None:
+        return f"put {listed(_put_back_with(named.name, said, findings))} back as the findings say"
     if named is not None and named.name not in diagnosis.run.config:
         return _looked_at(named.name, diagnosis)
     return ""
@@ -154,13 +155,24 @@ def _is_kept(name: str, diagnosis: Diagnosis) -> bool:
     return (diagnosis.abstained or "").endswith(KEPT) and name in kept.split(", ")
 
 
-def _names(finding: Finding, parameter: str) -> bool:
+def _says(finding: Finding, parameter: str) -> bool:
     """Whether a finding says what a parameter should be."""
-    return any(name == parameter for name, _ in finding.wanted)
+    return finding.title.startswith(parameter) or any(name == parameter for name, _ in finding.wanted)
+
+
+def _put_back_with(name: str, said: Finding, findings: Iterable[Finding]) -> list[str]:
+    """The parameter and those that critical findings of the same kind name with it: of two motors that were switched
+    off both are switched on again."""
+    alike = (one for one in findings if one.kind == said.kind and one.severity == "critical" and not one.after_impact)
+    return list(dict.fromkeys((name, *(other for one in alike for other in one.parameters))))
 
 
 def _looked_at(name: str, diagnosis: Diagnosis) -> str:
     """What to do with a parameter outside the profile that leads and whose change is not advised."""
+    refused = (one for one in diagnosis.health.findings if one.kind == "prearm" and name in one.parameters)
+    said = (text for one in refused for text in one.evidence.split("; ") if text.startswith(f"{name} is "))
+    if rule := next(said, ""):
+        return rule  # what the check asks for
     setting = diagnosis.run.settings.get(name)
     value = "" if setting is None else f" {shown(setting.value)}"
     suspect = next((one for one in diagnosis.outside if one.name == name), None)

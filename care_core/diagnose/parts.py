@@ -104,10 +104,16 @@ def is_pack(part: Finding) -> bool:
     return part.kind in ("battery", "prearm") and not part.title.startswith((OWN_SUPPLY, NO_BATTERY))
 
 
-def unmended(part: Finding) -> str:
-    """Why no parameter is changed while this part has failed."""
+def unmended(part: Finding, then: str = "") -> str:
+    """Why no parameter is changed while this part has failed.
+
+    Args:
+        then: what is likelier than the part, and changed once it is mended.
+    """
     if is_pack(part):
         return f"{part.title}: charge or replace the battery; nothing is changed until it is full"
     if part.title == IDLED:
         return f"{part.title} at {log_time(part.onset_s)}: no parameter is changed for how it was steered"
+    if then:
+        return f"{part.title} at {log_time(part.onset_s)}: mend that first; {then}"
     return f"{part.title} at {log_time(part.onset_s)}: nothing is changed until that is mended"

@@ -9,7 +9,7 @@ score on some robot.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -45,10 +45,10 @@ class Promise(Record, eq=False):
         """Probability that the next run meets every limit without a change."""
         return float(self.odds([self.query.config])[0])
 
-    def without(self, parameter: str, config: Config) -> float:
-        """Probability that the next run meets every limit under a configuration and with a parameter right that no
-        mechanism knows: of that the causes tell alone."""
-        gone: frozenset[Key] = self._changed(config) | {("parameter", parameter)}
+    def without(self, parameters: Collection[str], config: Config) -> float:
+        """Probability that the next run meets every limit under a configuration and with parameters right that no
+        mechanism knows: of these the causes tell alone."""
+        gone: frozenset[Key] = self._changed(config) | {("parameter", name) for name in parameters}
         odds = float(self.failure.repaired(gone) * self._others_kept([config])[0])
         return min(odds, self.as_driven() + self.failure.acts_among(gone))
 

@@ -110,6 +110,7 @@ def _finding(
     places = {motor.number: f" ({motor.place})" for motor in motors if motor.place}
     off = listed([f"motor {n}{places.get(n, '')}" for n in stopped])
     since_s, later_s = several[0].time_s, upset.time_s - several[-1].time_s
+    told = [f"{one}{f' at {log_time(one.time_s)}' if len(several) > 1 else ''}" for one in several[:_NAMED]]
     back = ", ".join(f"'param set {one.name} {shown(one.before)}'" for one in several[:_NAMED])
     return Finding(
         kind="tuning",
@@ -118,7 +119,7 @@ def _finding(
         onset_s=since_s,
         end_s=max(upset.time_s, several[-1].time_s),
         severity="critical" if is_lost else "warning",
-        evidence=f"{'; '.join(map(str, several[:_NAMED]))}; {upset.what} {later_s:.1f} s later "
+        evidence=f"{'; '.join(told)}; {upset.what} {later_s:.1f} s later "
         f"({log_time(upset.time_s)}). To put it back: {back}",
         source=source,
         suspect="parameter",

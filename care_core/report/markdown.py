@@ -97,7 +97,7 @@ def _objective(one: ObjectiveEntry) -> str:
 def _causes(names: list[str], causes: Iterable[CauseEntry], as_driven: float | None) -> Iterator[str]:
     yield from ("", f"## Causes of {listed([f'`{name}`' for name in names])}", "")
     lines = [line for cause in causes for line in _cause(cause, as_driven)]
-    yield from lines or ["None was found among the parameters of the profile."]
+    yield from lines or ["None is likely among the parameters of the profile."]
 
 
 def _cause(cause: CauseEntry, as_driven: float | None) -> Iterator[str]:

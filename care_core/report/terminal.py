@@ -115,7 +115,7 @@ def _causes(faults: Sequence[Fault], as_driven: float | None) -> Iterator[str]:
     fault = faults[-1]
     shown = [cause for cause in fault.causes if not cause.is_lead]
     if not shown:
-        yield "  none was found among the parameters of the profile"
+        yield "  none is likely among the parameters of the profile"
     for cause in shown:
         yield from _cause(cause, as_driven)
     leads = [f"{c.option.name} ({c.option.driven(c.current, c.is_assumed)})" for c in fault.causes if c.is_lead]

@@ -55,8 +55,8 @@ def test_a_change_adds_no_more_than_what_it_touches_explains(planted: Profile) -
 
 def test_a_parameter_that_no_mechanism_knows_is_promised_by_the_causes_alone(planted: Profile) -> None:
     one = promise(planted, {("parameter", "FRAME_TYPE"): 0.9})
-    assert one.without("FRAME_TYPE", one.query.config) > 0.5
-    assert one.without("RTL_ALT", one.query.config) < 0.1
+    assert one.without(["FRAME_TYPE"], one.query.config) > 0.5
+    assert one.without(["RTL_ALT"], one.query.config) < 0.1
 
 
 def test_necessity_is_the_share_of_failures_that_a_change_takes_away(planted: Profile) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import cast, get_args
 
 from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect
 from care_core.ecosystems.findings import Finding, every_finding
 from care_core.ecosystems.vehicles import vehicle_of_run
-from care_core.ecosystems.vehicles.vehicle import Vehicle
+from care_core.ecosystems.vehicles.vehicle import Kind, Vehicle
 from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import Role as ParameterRole
 from care_core.metadata.causal_map import meaning_of
@@ -65,8 +65,7 @@ def leading_outside(
     if finding is None and suspect is None:
         return None
     is_learned = suspect is not None and suspect.is_learned and meaning is not None and meaning.role in LEARNED
-    is_kept = not mended(first.name) if meaning is None else meaning.role == "safety" or meaning.part == BUILT_AS
-    is_carried = (measured is not None or is_learned) and not is_kept
+    is_carried = (measured is not None or is_learned) and not _is_kept(first.name, vehicle_of_run(run).kind)
     return Advisable(
         first.name,
         float(setting.value),
@@ -83,10 +82,33 @@ def outside_fix(one: Advisable, odds: float, run: Run, beside: Sequence[Change] 
     is wanted."""
     if one.wanted is None:
         raise ValueError(f"no value of {one.name} is known to be right")
-    option = outside_option(one.name, one.wanted, vehicle_of_run(run))
-    again = "a reboot" if mended(one.name) is None else "a restart"
-    notes = (f"takes effect after {again}",) if option.reboot_required else ()
-    return Fix((Change(option, one.value, one.wanted, notes), *beside), odds, {})
+    return Fix((_change(one.name, one.value, one.wanted, run), *beside), odds, {})
+
+
+def refused_beside(findings: Sequence[Finding], run: Run, known: Collection[str]) -> tuple[Change, ...]:
+    """The parameters besides the known ones that a refusal to arm names, each at the value that its check asks for.
+    What protects, and how the vehicle is built, is left to its operator."""
+    refused = (one for one in every_finding(findings) if one.kind == "prearm" and one.severity == "critical")
+    asked = {name: value for one in refused for name, value in one.wanted if name not in known}
+    kind = vehicle_of_run(run).kind
+    told = {name: run.settings[name].value for name in asked if name in run.settings and not _is_kept(name, kind)}
+    return tuple(
+        _change(name, float(value), asked[name], run)
+        for name, value in told.items()
+        if isinstance(value, (int, float)) and value != asked[name]
+    )
+
+
+def _change(name: str, value: float, wanted: float, run: Run) -> Change:
+    option = outside_option(name, wanted, vehicle_of_run(run))
+    again = "a reboot" if mended(name) is None else "a restart"
+    return Change(option, value, wanted, (f"takes effect after {again}",) if option.reboot_required else ())
+
+
+def _is_kept(name: str, kind: Kind) -> bool:
+    """Whether only its operator puts it back: what protects, how a vehicle is built, and what no map knows."""
+    meaning = meaning_of(name, kind)
+    return not mended(name) if meaning is None else meaning.role == "safety" or meaning.part == BUILT_AS
 
 
 def shown_fix(lead: Advisable | None, run: Run) -> Fix | None:

@@ -59,7 +59,7 @@ def outside_suspects(
         like = [flight for flight in flights if flight.is_lost and _is_alike(flight, signs)]
         weight = _wrong(one, flights, counts) * _shows(one, flights, like, signs)
         if weight >= LEAST:
-            found.append(_suspect(one, weight, _flown(like)))
+            found.append(_suspect(one, weight, _flown(one.value, like)))
     return tuple(sorted(found, key=lambda suspect: (-suspect.weight, suspect.name)))
 
 
@@ -179,8 +179,11 @@ def _answers(meaning: Meaning, signs: Signs) -> float:
     return MAY_ANSWER if meaning.signs & signs.every else 0.0
 
 
-def _flown(like: Sequence[Flight]) -> str:
+def _flown(value: float, like: Sequence[Flight]) -> str:
+    """Which flights failed as this run did: those with its value, else with the nearest ones."""
     if not like:
         return ""
-    values = listed([shown(flight.value) for flight in like][:3])
+    flown = {flight.value for flight in like}
+    nearest = sorted(flown, key=lambda one: (abs(one - value), one))[: 1 if value in flown else 3]
+    values = listed([shown(one) for one in sorted(nearest)])
     return f"simulated flights with it at {values} failed in this way"
