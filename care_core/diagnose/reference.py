@@ -70,6 +70,7 @@ def reference_of(run: Run, schema: Schema, model: Model, good: Good | None = Non
         # A value that may not be suggested is no reference, but where it is driven it is none to be off either.
         if schema.variables[name].accepts(value) or (name in named and _is_same(value, run.config.get(name))):
             config[name] = value
+    config.update(_as_trained(run, profile_config(schema, model), recorded, named))
     config.update(dict(_of_the_airframe(run, schema, recorded, named)))
     lower = {name: own for name, own in _ceilings(run, schema) if name not in named and own < config.get(name, own)}
     config.update(lower)
@@ -80,6 +81,13 @@ def reference_of(run: Run, schema: Schema, model: Model, good: Good | None = Non
     vendor = f", but not what a vendor made the default, {', '.join(others)}" if others else ""
     slower = f", {', '.join(lower)} as low as this robot's" if lower else ""
     return Reference(config, _whose(named, recorded, good) + vendor + slower)
+
+
+def _as_trained(run: Run, trained: Config, recorded: Collection[str], named: Container[str]) -> dict[str, float]:
+    """Options that were driven at the profile's own reference, where the log's default is another: the runs that
+    training knows to be sound had that value."""
+    own = {name: run.config.get(name) for name in recorded if name in trained and name not in named}
+    return {name: trained[name] for name, value in own.items() if _is_same(trained[name], value)}
 
 
 def _vendors(run: Run, schema: Schema) -> dict[str, tuple[float, float]]:

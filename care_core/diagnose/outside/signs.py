@@ -25,8 +25,13 @@ OF_KIND: Mapping[FindingKind, Sign] = {
 _OF_TITLE: tuple[tuple[re.Pattern[str], Sign], ...] = (
     (re.compile(r"oscillates"), "oscillates"),
     (re.compile(r"waits to be set off"), "stuck"),
-    (re.compile(r"^it (drives|turns) against|runs away|trim of the .* not (its|their) middle|TURN_RADIUS"), "strays"),
-    (re.compile(r"an output ends before"), "stuck"),
+    (
+        re.compile(
+            r"^it (drives|turns) against|drives where|runs away|trim of the .* not (its|their) middle|TURN_RADIUS"
+        ),
+        "strays",
+    ),
+    (re.compile(r"an output ends before|it stands before"), "stuck"),
     (re.compile(r"heading does not follow"), "heading"),
     (re.compile(r"battery failsafe|not charged|battery sags"), "failsafe_battery"),
     (re.compile(r"ground station"), "failsafe_gcs"),

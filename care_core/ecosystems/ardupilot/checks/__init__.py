@@ -40,6 +40,7 @@ from care_core.ecosystems.ardupilot.checks.settings import (
     hover,
     level,
     outputs,
+    standing,
     supply,
     thrust_curve,
 )
@@ -64,6 +65,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     charge.CHECK,
     driven.CHECK,
     outputs.CHECK,
+    standing.CHECK,
     airspeed.CHECK,
     lift.CHECK,
     propeller.CHECK,

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Mask, Span
+from care_core.ecosystems.ardupilot.spans import Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
@@ -26,6 +26,7 @@ _ASKS = LIMITS.add("least throttle", 5.0, "%", "Rover/crash_check.cpp")
 _LASTS_S = LIMITS.add(
     "time for which it drives against its throttle", 10.0, "s", "a choice: brakes and gusts last less"
 )
+_STEERS = LIMITS.add("full steering", 0.9, "", "a choice: a share of all that there is")
 _RECORDS = LIMITS.add("fewest records of steering", 20.0, "", "a choice: some seconds of driving")
 _TURNS_DPS = LIMITS.add("least turning", 0.5, "deg/s", "a choice: above what a gyro wanders by")
 _AGAINST = LIMITS.add(
@@ -37,6 +38,10 @@ _SURE = LIMITS.add("probability of the parameter", 0.95, "", "no other explains 
 _AUTO = 10
 """Number of the mode that runs missions (Rover/mode.h)."""
 _STEERING, _THROTTLE, _BALANCE_BOT = 26, 70, 3
+_SIDES = (73, 74)
+"""Functions of the wheels on the left and on the right (SRV_Channel.h)."""
+_FULL = 4500.0
+"""SteerOut of full steering (AR_Motors)."""
 _SET_OFF = ("AUTO_KICKSTART", "AUTO_TRIGGER_PIN")
 _TURNED = ("AHRS_ORIENTATION", "COMPASS_ORIENT")
 """What turns the vehicle in its own eyes: then no sign tells of the outputs."""
@@ -53,6 +58,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     yield from _backwards(flight, driven)
     if steered is not None:
         yield from _steered_against(flight, driven, steered)
+        yield from _one_wheel_against(flight, driven, steered)
 
 
 def _waiting(flight: Flight, driven: Table) -> Iterator[Finding]:
@@ -103,6 +109,24 @@ def _steered_against(flight: Flight, driven: Table, steered: Table) -> Iterator[
         yield _told(
             flight, *_reversed(flight, outputs[0]), (float(t[0]), float(t[-1])), "it turns against its steering",
             f"correlation of steering and turn rate {agrees:.2f} over {t[-1] - t[0]:.0f} s (limit {_AGAINST:g})",
+        )  # fmt: skip
+
+
+def _one_wheel_against(flight: Flight, driven: Table, steered: Table) -> Iterator[Finding]:
+    """A skid-steered rover that drives where it steers, since the wheels of one side turn round: it neither turns nor
+    stops. Which side that is, only a parameter tells that was changed."""
+    t = driven.t
+    steers = np.abs(np.interp(t, steered.t, steered["SteerOut"])) >= _STEERS * _FULL
+    turns = np.abs(np.interp(t, steered.t, steered["TurnRate"])) > _TURNS_DPS
+    drives = (np.abs(driven["ThrOut"]) < _ASKS) & (np.abs(driven["Speed"]) > _MOVES_MS)
+    sides = [f"SERVO{n}_REVERSED" for function in _SIDES for n in _outputs(flight, function)]
+    turned = [name for name in sides if _is_off(flight, name)]
+    spans = lasting(t, flight.drives_itself(t) & steers & ~turns & drives, _LASTS_S)
+    if spans and len(sides) == len(_SIDES) and len(turned) == 1:
+        yield _told(
+            flight, turned[0], _default(flight, turned[0]), spans[0], "it drives where it steers",
+            f"for {spans[0][1] - spans[0][0]:.0f} s at full steering without a turn, and without throttle at "
+            f"{np.max(np.abs(driven['Speed'][during(spans, t)])):.1f} m/s (limit {_LASTS_S:g} s)",
         )  # fmt: skip
 
 
