@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Container, Mapping, Sequence
 
 import numpy as np
@@ -11,7 +12,6 @@ from care_core.causal.graph import Edge
 from care_core.causal.mechanisms import columns
 from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, Ways
-from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
 from care_core.diagnose.symptoms import NOTHING, ROUNDING, better_than_expected, pointers
 from care_core.records import Record
@@ -20,6 +20,8 @@ from care_core.variables import Role
 
 FELT = 0.05
 """Effect times support, in standard deviations, from which an edge is taken to carry something of this run."""
+ROUNDED = 1e-3
+"""Share of a value that no vehicle feels: tools write four digits."""
 HARDLY = 0.01
 """Share of its acceptable range by which an option may be off its reference and be as good as at it."""
 
@@ -53,8 +55,9 @@ class Suspect(Record):
 
 
 def deviating(config: Config, reference: Config) -> tuple[str, ...]:
-    """Options whose value in this run is not the reference's."""
-    return tuple(n for n, value in reference.items() if n in config and not same_value(config[n], value))
+    """Options whose value in this run is not the reference's, but for what rounding leaves."""
+    shared = ((name, config[name], value) for name, value in reference.items() if name in config)
+    return tuple(n for n, own, value in shared if not math.isclose(own, value, rel_tol=ROUNDED, abs_tol=1e-12))
 
 
 def suspects(

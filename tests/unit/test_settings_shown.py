@@ -334,12 +334,21 @@ def test_a_board_that_is_told_a_wrong_mounting(number: int) -> None:
 def test_a_compass_inside_a_turned_board_that_is_said_to_be_outside(orient: float) -> None:
     made = MadeWithDefaults()
     compasses(made)
-    made.drive("AHRS_ORIENTATION", 2, 0)  # rightly
+    made.drive("AHRS_ORIENTATION", 8, 0)  # rightly, as gravity tells
     made.drive("COMPASS_EXTERNAL", 1, 0)
-    turn(made, "MAG", np.linalg.inv(mounting(2)))
+    turn(made, "MAG", np.linalg.inv(mounting(8)))
     assert naming(made, "COMPASS_EXTERNAL").wanted == (("COMPASS_EXTERNAL", 0.0),)
     made.drive("COMPASS_ORIENT", orient, 0)
     assert bool([one for one in made.find() if "COMPASS_EXTERNAL" in one.parameters]) == (orient == 0)
+
+
+def test_a_board_that_nothing_says_is_mounted_as_told_is_doubted_before_where_a_compass_is() -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("AHRS_ORIENTATION", 2, 0)
+    made.drive("COMPASS_EXTERNAL", 1, 0)
+    turn(made, "MAG", np.linalg.inv(mounting(2)))
+    assert naming(made, "AHRS_ORIENTATION").wanted == (("AHRS_ORIENTATION", 0.0),)
 
 
 def test_a_mounting_off_its_default_that_is_right_is_none() -> None:

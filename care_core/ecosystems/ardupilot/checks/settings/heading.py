@@ -13,6 +13,7 @@ from itertools import permutations
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.settings import gravity
 from care_core.ecosystems.ardupilot.checks.settings.course import Course, Leans
 from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.ardupilot.flight import Flight
@@ -28,6 +29,7 @@ _FIELD = ("MagX", "MagY", "MagZ")
 _MOTORS = ("MOX", "MOY", "MOZ")
 READS: Wanted = {
     "MAG": (*_FIELD, *_MOTORS), "ATT": ("Roll", "Pitch", "Yaw"), "GPS": ("Spd", "GCrs"), "XKF4": ("SM",),
+    **gravity.READS,
 }  # fmt: skip
 
 LIMITS = Limits()
@@ -49,6 +51,8 @@ _UNTOUCHED_S = LIMITS.add(
 _SURE = LIMITS.add("probability that undoing it mends", 0.95, "", "no other parameter brings the compass back")
 _NEAR = LIMITS.add("measured value that is the default", 0.05, "", "a choice: a share of the field")
 _FEWEST, _ROUNDED = 3, 0.01
+_TILTED = 0.05
+"""By how much more a mounting turns down into the side of a board, gravity tells it."""
 _FLAT = 16
 """Mountings below this are level, the right way up or upside down."""
 
@@ -170,7 +174,21 @@ class _Compass:
 
 
 def _by_others(compasses: list[_Compass]) -> Undone | None:
-    """A compass that another agrees with once one of its parameters is undone."""
+    """A compass that another agrees with once one of its parameters is undone. One that is told to be outside the board
+    agrees as well with those inside it once it is turned with them: unless gravity says that the board is mounted as it
+    is told, that is what is wrong, since drivers find out themselves where a compass is."""
+    found = list(_mended_by_others(compasses))
+    is_right = bool(compasses) and _is_told_by_gravity(compasses[0].flight)
+    return min(found, key=lambda one: "_EXTERN" in one.parameter and not is_right, default=None)
+
+
+def _is_told_by_gravity(flight: Flight) -> bool:
+    """Whether the board's mounting is one that gravity tells, and right by it."""
+    turned = matrix(flight.setting("AHRS_ORIENTATION") or 0.0)
+    return turned is not None and abs(turned[2, 2] - 1.0) > _TILTED and gravity.is_upright(flight)
+
+
+def _mended_by_others(compasses: list[_Compass]) -> Iterator[Undone]:
     is_refused = bool(compasses) and compasses[0].flight.refused_for("compass", "mag field") is not None
     limit = _REFUSED if is_refused else _APART
     for one, other in permutations(compasses, 2):
@@ -182,7 +200,7 @@ def _by_others(compasses: list[_Compass]) -> Undone | None:
         undone = [(_apart(field, expected) / size, name, default) for name, default, field in one.undone()]
         left, name, default = min(undone, default=(math.inf, "", 0.0))
         if left < min(_AGREES, _MENDS * apart):
-            return Undone(
+            yield Undone(
                 parameter=name,
                 wanted=one.measured(name, default, expected),
                 title=_title(one, name),
@@ -192,7 +210,6 @@ def _by_others(compasses: list[_Compass]) -> Undone | None:
                     f"with its default {default:g}"
                 ),
             )
-    return None
 
 
 def _by_course(flight: Flight, compasses: list[_Compass]) -> Undone | None:

@@ -11,20 +11,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.checks.settings import heading
+from care_core.ecosystems.ardupilot.checks.settings import gravity, heading
 from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import median
 from care_core.records import Record
 
-_AXES = ("AccX", "AccY", "AccZ")
-READS: Wanted = {"IMU": _AXES, "ATT": ("Roll", "Pitch")}
+READS: Wanted = merge_needs((gravity.READS, {"ATT": ("Roll", "Pitch")}))
 
-LIMITS = Limits()
+LIMITS = Limits(gravity.LIMITS)
 _G = LIMITS.add("acceleration of what stands", 9.81, "m/s^2", "gravity, within 0.03 anywhere on the ground")
 _OFF = LIMITS.add("accelerometer off it, or off another", 0.5, "m/s^2", "two thirds of ARMING_ACCTHRESH")
 _RIGHT = LIMITS.add("accelerometer that measures it", 0.2, "m/s^2", "a choice: calibrations leave less")
@@ -33,14 +32,11 @@ _LEVEL_DEG = LIMITS.add("lean of what stands level by its accelerometers", 2.0, 
 _TURNED_DEG = LIMITS.add(
     "gravity off the bottom of a board", 60.0, "deg", "a choice: nothing takes off from such a slope"
 )
-_UPRIGHT_DEG = LIMITS.add("gravity at the bottom of a board", 20.0, "deg", "a choice: a slope to take off from")
 _NEAR_RAD = LIMITS.add("measured trim that is the default", 0.02, "rad", "a choice: a degree")
 _SURE = LIMITS.add("probability that undoing it mends", 0.95, "", "no other parameter brings it back")
 _TRIM_LOST = LIMITS.add(
     "probability that a trim costs the mission", 0.15, "", "0 of 4 flights with 6 to 10 degrees failed"
 )
-_FEWEST, _IDLES = 3, 0.05
-"""Records, and the throttle above which motors may lift."""
 
 
 class Undone(Record):
@@ -79,7 +75,7 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def wrong_accelerometer(flight: Flight) -> Undone | None:
     """The offset or scale of an accelerometer whose undoing makes it feel gravity as it is, and as others do."""
-    felt = _felt(flight)
+    felt = gravity.felt(flight)
     for number, one in felt.items():
         others = [other for n, other in felt.items() if n != number and _is_gravity(other)]
         before = _off(one, others)
@@ -102,22 +98,6 @@ def wrong_accelerometer(flight: Flight) -> Undone | None:
                 source="IMU.AccX, AccY, AccZ before take-off",
             )
     return None
-
-
-def _felt(flight: Flight) -> dict[int, Floats]:
-    """By the number of its sensor what stands feels, shape (3,)."""
-    tables = ((n, _standing(flight, table)) for n, table in enumerate(flight.all("IMU", *_AXES), start=1))
-    return {n: np.array([median(table[axis]) for axis in _AXES]) for n, table in tables if len(table) >= _FEWEST}
-
-
-def _standing(flight: Flight, table: Table) -> Table:
-    """The records of a copter before it is in the air, and before its motors lift; of others until they arm."""
-    until = min((start for start, _ in (flight.airborne if flight.is_copter else flight.armed)), default=flight.end_s)
-    if flight.throttle is not None and flight.armed:
-        t, driven = flight.throttle
-        lifting = t[(driven > _IDLES) & (t > flight.armed[0][0])]
-        until = min(until, float(lifting[0]) if len(lifting) else until)
-    return table.where((table.t < until) & np.isfinite(sum(table[name] for name in table.columns)))
 
 
 def _is_gravity(felt: Floats) -> bool:
@@ -151,14 +131,14 @@ def _calibrations(flight: Flight, number: int, felt: Floats) -> Iterator[tuple[s
 def _turned(flight: Flight) -> Undone | None:
     """A board on whose bottom gravity does not pull, and would where it were mounted as by default."""
     default, value = flight.default_left("AHRS_ORIENTATION"), flight.setting("AHRS_ORIENTATION")
-    felt = list(_felt(flight).values())
+    felt = list(gravity.felt(flight).values())
     if default is None or value is None or not felt or heading.wrong_setting(flight) is not None:
         return None
     before, after = matrix(value), matrix(default)
     if before is None or after is None:
         return None
-    leans = [_lean_deg(one) for one in felt]
-    if min(leans) > _TURNED_DEG and max(_lean_deg(after @ before.T @ one) for one in felt) < _UPRIGHT_DEG:
+    leans = [gravity.lean_deg(one) for one in felt]
+    if min(leans) > _TURNED_DEG and max(gravity.lean_deg(after @ before.T @ one) for one in felt) < gravity.UPRIGHT_DEG:
         return Undone(
             parameter="AHRS_ORIENTATION",
             wanted=default,
@@ -175,9 +155,14 @@ def _turned(flight: Flight) -> Undone | None:
 
 def _trimmed(flight: Flight) -> Undone | None:
     """A trim by which a vehicle that stands level by its accelerometers has a horizon that leans."""
-    felt, attitude = _felt(flight), flight.one("ATT", "Roll", "Pitch")
-    standing = None if attitude is None else _standing(flight, attitude)
-    if standing is None or len(standing) < _FEWEST or not felt or max(map(_lean_deg, felt.values())) > _LEVEL_DEG:
+    felt, attitude = gravity.felt(flight), flight.one("ATT", "Roll", "Pitch")
+    standing = None if attitude is None else gravity.standing(flight, attitude)
+    if (
+        standing is None
+        or len(standing) < gravity.FEWEST
+        or not felt
+        or max(map(gravity.lean_deg, felt.values())) > _LEVEL_DEG
+    ):
         return None
     for name, angle in (("AHRS_TRIM_X", "Roll"), ("AHRS_TRIM_Y", "Pitch")):
         lean = float(median(standing[angle]))
@@ -197,11 +182,6 @@ def _trimmed(flight: Flight) -> Undone | None:
                 mission_lost=_TRIM_LOST,
             )
     return None
-
-
-def _lean_deg(felt: Floats) -> float:
-    """The angle between the bottom of a board and gravity."""
-    return float(np.degrees(np.arccos(np.clip(-felt[2] / max(float(np.linalg.norm(felt)), 1e-9), -1.0, 1.0))))
 
 
 CHECK = Check(
