@@ -7,6 +7,7 @@ The run comes as triage leaves it: what triage does not find well has not recove
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Literal
 
 from care_core.configs.driven import option_value, readable, same_value
@@ -36,6 +37,10 @@ class Before(Record):
 
 
 SAME_LOG = "this is the log that the report is about, not one of a later run"
+
+NEITHER = "neither the change nor the mission is that of the report"
+OTHER_NEED = 0.1
+"""Share by which what two missions need differs where they are not the same one."""
 
 NOT_HELD = Before(None, "not_evaluated", None)
 """An objective of which the report says nothing."""
@@ -140,8 +145,11 @@ def verify(promise: Promise, diagnosis: Diagnosis, schema: Schema, thresholds: C
         )
         for one in diagnosis.objectives
     )
-    verdict, sentence = _verdict(changes, others, checks, diagnosis, _doubt(promise, run, schema))
-    notes = tuple(_notes(promise, run, schema, diagnosis.objectives, own))
+    another = tuple(islice(_another_mission(checks), 1))
+    nothing_alike = another and not any(change.made == "made" for change in changes)
+    doubt = _doubt(promise, run, schema) or (NEITHER if nothing_alike else "")
+    verdict, sentence = _verdict(changes, others, checks, diagnosis, doubt)
+    notes = (*_notes(promise, run, schema, diagnosis.objectives, own), *another)
     headline = verdict_of(diagnosis).headline
     return Verification(verdict, sentence, chosen, kept.p_fixed, changes, others, checks, headline, notes)
 
@@ -170,6 +178,18 @@ def _doubt(promise: Promise, run: Run, schema: Schema) -> str:
     if run.log.sha256 == promise.sha256:
         return SAME_LOG
     return "" if schema.travels else run.mission.mismatch
+
+
+def _another_mission(checks: Iterable[ObjectiveCheck]) -> Iterator[str]:
+    """What tells that the mission is another one than the report's: what its reference configuration needs."""
+    for one in checks:
+        before, after = one.before.need, one.after.need
+        if before and after is not None and abs(after.value / before - 1.0) > OTHER_NEED:
+            unit = f" {one.variable.unit}" if one.variable.unit else ""
+            yield (
+                f"another mission: the reference configuration needs {after.value:.4g}{unit} of {one.variable.name} "
+                f"for it, {before:.4g}{unit} for that of the report"
+            )
 
 
 def _notes(

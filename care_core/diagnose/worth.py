@@ -10,7 +10,7 @@ from care_core.diagnose.parts import LATE_S, set_wrong
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Cause, Fault, Fix, Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ranking import LIKELY
+from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.records import replace
 from care_core.run import FitVerdict
 from care_core.text import log_time, percent
@@ -77,6 +77,8 @@ def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = (
             f"{earliest.title} from {log_time(earliest.onset_s, 0)} on, before {rival.name}: that speaks of how the "
             "robot is set, and training does not tell which parameter does it"
         )
+    if any(one.title == rival.name and one.kind in SYMPTOMS for one in findings):
+        return f"{rival.name}, and neither this log nor training says why"
     return f"{rival.name}; that explains this failure better than any parameter: look at it first"
 
 

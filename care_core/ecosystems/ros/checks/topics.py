@@ -57,6 +57,8 @@ BEFORE_S = 1e-3
 _QOS = re.compile(r"incompatible qos", re.IGNORECASE)
 _TOPIC = re.compile(r"topic '?\"?([\w/~]+)")
 _KINDS: dict[str, FindingKind] = {ODOMETRY: "topics", IMU: "imu", BATTERY: "battery"}
+_RECORDER = "rosbag2"
+"""What the names of recorders hold."""
 _JUDGED_ELSEWHERE = (SCAN, CLOUD, *COMMANDS, STATUS)
 
 
@@ -87,17 +89,20 @@ def _qos(drive: Drive) -> Iterator[Finding]:
     for name, (at, node, text) in complaints.items():
         empty = counts.get(name) == 0
         what = "nothing of it was recorded" if empty else f"{counts.get(name, 0)} messages were recorded"
+        is_recorders = _RECORDER in node  # who else subscribes gets its messages, as far as this tells
         yield Finding(
             kind="topics",
             title=f"{name}: incompatible QoS between publisher and subscriber",
             onset_s=at,
             end_s=at,
             severity="warning" if empty else "info",
-            evidence=f'{what}; {node}: "{shortened(text, 160)}"',
+            evidence=f'{what}; {node}: "{shortened(text, 160)}"'
+            + ("; that concerns the recording alone" if is_recorders else ""),
             source="/rosout; a subscriber that asks for reliable gets nothing from a best-effort publisher (ROS 2,"
             " About QoS)",
             suspect="operation",
             probability=0.95,
+            mission_lost=0.0 if is_recorders else None,
         )
 
 
