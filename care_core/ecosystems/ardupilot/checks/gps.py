@@ -47,6 +47,7 @@ _LONG_S = LIMITS.add("critical loss of the fix", 5.0, "s", "a choice: the estima
 _RATIO = LIMITS.add("test ratio of the estimator", 1.0, "", "AP_NavEKF3: above it the position is rejected")
 _HACC_M = LIMITS.add("accuracy of the position", 10.0, "m", "twice what the firmware's checks want")
 _SACC_MS = LIMITS.add("accuracy of the speed", 3.0, "m/s", "three times what the firmware's checks want")
+_CLOCK = LIMITS.add("pace of the receiver's clock, either way", 2.0, "", "a choice: simulators run at their own pace")
 _METRES, _DAY_MS = 111319.5, 86_400_000.0
 _FIX = 3
 _ERR_GPS, _ERR_GPS_LOST, _GLITCH = 11, 7, 2
@@ -141,7 +142,7 @@ def _unexplained(table: Table) -> tuple[Floats, Floats]:
     dt = np.diff(table.t)
     if "GMS" in table.columns:  # the receiver's own clock: records are written late now and then
         own = np.diff(table["GMS"]) / 1e3
-        if abs(float(own.sum() - dt.sum())) < 0.05 * float(dt.sum()) + 1.0:
+        if float(dt.sum()) / _CLOCK < float(own.sum()) < float(dt.sum()) * _CLOCK:
             dt = np.where(own > 0, own, dt)
     course = np.radians(table["GCrs"])
     north, east = table["Spd"] * np.cos(course), table["Spd"] * np.sin(course)
