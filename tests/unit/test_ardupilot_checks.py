@@ -283,6 +283,20 @@ def test_a_receiver_whose_velocity_never_fits_tells_of_no_jump() -> None:
     assert not [one for one in made.find() if "jumps" in one.title]
 
 
+@pytest.mark.parametrize(("pace", "jumps"), [(1.3, False), (9.0, True)])
+def test_records_that_waited_for_the_link_are_timed_by_the_receiver(pace: float, *, jumps: bool) -> None:
+    """Of a simulation that runs at its own pace; a clock that keeps no time times nothing."""
+    made = Made()
+    gps = made.table["GPS"]
+    gps["Lat"] = gps["Lat"][0] + np.cumsum(np.append(0.0, np.diff(made.t))) * 20.0 * METRE
+    gps["Spd"], gps["GCrs"] = np.full_like(made.t, 20.0 / pace), np.zeros_like(made.t)
+    gps["GMS"] = made.t * 1e3 * pace
+    late = made.after(FAILS_S, FAILS_S + 2.0)
+    gps["Lat"] = np.where(late, gps["Lat"][np.flatnonzero(late)[0]], gps["Lat"])
+    gps["GMS"] = np.where(late, gps["GMS"][np.flatnonzero(late)[0]], gps["GMS"])
+    assert ("jumps" in " ".join(one.title for one in made.find())) is jumps
+
+
 def test_few_satellites() -> None:
     made = Made()
     made.table["GPS"]["NSats"][made.after(FAILS_S)] = 5
@@ -1019,10 +1033,25 @@ def test_motors_that_the_emergency_switch_stops_in_the_air_are_told(at_s: float,
     made.table["RCIN"] = {f"C{n}": np.full_like(made.t, 1500.0) for n in range(1, 15)}
     made.table["RCIN"]["C8"] = np.where(made.t > at_s, 1934.0, 1094.0)
     title = "the emergency switch stopped the motors in the air"
-    assert (title in [one.title for one in made.find()]) is told
     recorded = Made()
     recorded.rows["EV"] = [(at_s, {"Id": 54.0})]
+    for one in (made, recorded):
+        _drop(one, at_s)
+    assert (title in [one.title for one in made.find()]) is told
     assert (title in [one.title for one in recorded.find()]) is told
+
+
+def _drop(made: Made, at_s: float) -> None:
+    """It falls to the ground from a time on."""
+    left = np.where(made.t > at_s, np.maximum(12.0 - 5 * (made.t - at_s) ** 2, 0.0) / 12.0, 1.0)
+    made.table["POS"]["RelHomeAlt"] *= left
+    made.table["CTUN"]["Alt"] *= left
+
+
+def test_what_keeps_its_height_without_motors_stands_whatever_its_barometer_says() -> None:
+    made = Made()
+    made.rows["EV"] = [(50.0, {"Id": 54.0})]
+    assert "the emergency switch stopped the motors in the air" not in [one.title for one in made.find()]
 
 
 def test_a_blow_that_stops_it_is_no_vibration() -> None:

@@ -17,6 +17,8 @@ LIMITS = Limits()
 _HIGH_US = LIMITS.add("pulse of a switch that is on", 1800.0, "us", "RC_Channel.h: AUX_SWITCH_PWM_TRIGGER_HIGH")
 _OFF_US = LIMITS.add("pulse of a switch that is off", 1200.0, "us", "RC_Channel.h: AUX_SWITCH_PWM_TRIGGER_LOW")
 _ALOFT_M = LIMITS.add("height", 1.0, "m", "a choice: lower, a landing leg may touch")
+_FALLS_S = LIMITS.add("time in which it falls", 2.0, "s", "from 1 m a free fall takes half a second")
+_FALLS_M = LIMITS.add("fall", 0.5, "m", "half of the least height; what lies keeps its height")
 _STOPPED, _EMERGENCY_STOP = 54, 31
 """LogEvent::MOTORS_EMERGENCY_STOPPED, and the function of a switch that stops the motors (RC_Channel.h)."""
 
@@ -28,7 +30,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     thrown = sorted((*flight.events(_STOPPED), *_switched(flight)))
     stopped_s = next((t for t in thrown if any(start <= t <= end for start, end in flight.airborne)), None)
     height_m = None if stopped_s is None or flight.height is None else float(np.interp(stopped_s, *flight.height))
-    if stopped_s is not None and (height_m is None or height_m > _ALOFT_M):
+    if stopped_s is not None and (height_m is None or (height_m > _ALOFT_M and _falls(flight, stopped_s))):
         yield Finding(
             kind="crash",
             title=STOPPED,
@@ -40,6 +42,15 @@ def find(flight: Flight) -> Iterator[Finding]:
             suspect="operation",
             probability=0.9,
         )
+
+
+def _falls(flight: Flight, stopped_s: float) -> bool:
+    """Whether it lost height without its motors; a log that ends before tells nothing against it."""
+    assert flight.height is not None
+    t, height = flight.height
+    after = height[(t > stopped_s) & (t <= stopped_s + _FALLS_S)]
+    lasts = len(t) > 0 and float(t[-1]) >= stopped_s + _FALLS_S
+    return not lasts or not len(after) or float(np.interp(stopped_s, t, height) - after.min()) > _FALLS_M
 
 
 def _switched(flight: Flight) -> Iterator[float]:
