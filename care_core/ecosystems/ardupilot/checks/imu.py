@@ -60,6 +60,9 @@ _TURNS_OVER_S = LIMITS.add("left out before control was lost", 3.0, "s", "a choi
 _USUAL_VIBE = LIMITS.add("vibration where none is recorded", 15.0, "m/s^2", "a choice: half of what is acceptable")
 _SHAKEN_DPS = LIMITS.add("shaking that hides an offset", 20.0, "deg/s", "a choice: gyros are not sampled at once")
 _OFFSET_OVER_S = LIMITS.add("window of an offset", 15.0, "s", "a choice")
+_STEADY = LIMITS.add(
+    "share of it that stays from first to last", 0.5, "", "a choice: an offset drifts, and has one sign"
+)
 _LASTS_S = LIMITS.add("shortest noise or offset", 3.0, "s", "a choice: a blow is over sooner")
 _UNHEALTHY_S = LIMITS.add("shortest time marked unhealthy", 0.5, "s", "a choice: more than one record")
 _HELD_DEG = LIMITS.add("attitude error of what no longer holds it", 10.0, "deg", "a choice")
@@ -135,6 +138,8 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     is_noise = float(np.max((noise / limit)[inside])) > 1.0
     if is_noise and not _is_noisy_at_rest(sensors[0], apart, start):
         return
+    if not is_noise and np.abs(apart[:, inside].mean(axis=1)).max() < _STEADY * OFFSET_DPS:
+        return  # swings that are too fast for the record: two sensors seem apart now this way, now that
     size = quantile((noise if is_noise else offset)[inside], 0.9)
     allowed = float(median(limit[inside])) if is_noise else OFFSET_DPS
     severity = _severity(flight, ratio, start)
