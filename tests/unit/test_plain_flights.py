@@ -260,3 +260,23 @@ def test_a_plane_whose_log_begins_in_the_air_flew_though_it_only_sank(sinks_m: f
         GPS=replace(position, times=at, columns={"Spd": 20 + 0 * at}),
     )
     assert (checks(falling)["took_off"] == 1.0) is has_flown
+
+
+@pytest.mark.parametrize(("height_m", "has_flown"), [(30.0, True), (5.0, False)])
+def test_what_flies_above_its_home_all_along_took_off_before_the_log_begins(
+    height_m: float, *, has_flown: bool
+) -> None:
+    position, at = flight()["POS"], np.arange(0.0, 75.0, 0.5)
+    level = {**position.columns, "RelHomeAlt": np.full(len(position.t), height_m)}
+    driven = replace(position, times=at, columns={"ThO": np.full_like(at, 0.4)})
+    events = table([(10.0, 15)], "Id")
+    begun = flown(
+        {**COPTER, "vehicle": "fixed wing"},
+        mode=0,
+        ARM=None,
+        EV=events,
+        CTUN=driven,
+        POS=replace(position, columns=level),
+        GPS=replace(position, times=at, columns={"Spd": 14 + 0 * at}),
+    )
+    assert (checks(begun)["took_off"] == 1.0) is has_flown

@@ -158,11 +158,15 @@ def _took_off(mission: Mission, *, crashed: bool) -> Value:
 
 
 def _began_aloft(mission: Mission) -> bool:
-    """Whether a plane that moves as planes fly sank far below where the log begins: an autopilot that started in the
-    air takes its height there for that of the ground."""
+    """Whether it flew as the log begins: a plane that moves as planes fly and sinks far below that, since an autopilot
+    that started in the air takes its height there for that of the ground; or what flies so far above its home, whose
+    arming is not in the log, since home is set where it is armed."""
     flight, heights = flight_of(mission), _heights(mission)
-    fast = flight.is_winged and any(start < mission.end_s and end > mission.start_s for start, end in flight.airborne)
-    return fast and len(heights) > 0 and float(heights[0] - heights.min()) > _SINKS_M
+    if not any(start < mission.end_s and end > mission.start_s for start, end in flight.airborne):
+        return False
+    above = mission.table("POS")
+    is_above = not flight.arm_changes and has(above, "RelHomeAlt") and float(above["RelHomeAlt"].min()) > _SINKS_M
+    return is_above or (flight.is_winged and len(heights) > 0 and float(heights[0] - heights.min()) > _SINKS_M)
 
 
 def _landed(mission: Mission) -> Value:
