@@ -14,6 +14,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.liveness import Frozen, is_part
 from care_core.ecosystems.measures import find_extractor
 from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.ros.messages import LOCALISED
 from care_core.ecosystems.ros.sources import SOURCES
 from care_core.ecosystems.ros.sources import frozen as frozen_of
 from care_core.logs import formats
@@ -190,7 +191,7 @@ def test_a_path_by_a_frozen_receiver_is_none() -> None:
 # PX4
 
 
-def px4(name: str = "") -> tuple[Finding, ...]:
+def px4(name: str = "", valid: float | None = None) -> tuple[Finding, ...]:
     rng, t = np.random.default_rng(0), np.arange(0.0, 100.0, 0.1)
 
     def noise(size: float) -> Any:
@@ -217,6 +218,8 @@ def px4(name: str = "") -> tuple[Finding, ...]:
         tables[name] = {
             field: np.where(held, column[np.argmax(held)], column) for field, column in tables[name].items()
         }
+    if valid is not None:
+        tables["vehicle_local_position"]["xy_valid"] = np.full(len(t), valid)
     log = TablesLog({one: Table(t, columns) for one, columns in tables.items()}, 100.0, formats.PX4_ULG,
                     {"vehicle": "multicopter"})  # fmt: skip
     return examine(run_model(log)).findings
@@ -236,6 +239,12 @@ def px4(name: str = "") -> tuple[Finding, ...]:
 )
 def test_a_source_that_freezes_on_px4_is_named(topic: str, title: str) -> None:
     assert [one.onset_s for one in frozen(px4(topic)) if one.title == title] == [pytest.approx(40.0, abs=0.2)]
+
+
+@pytest.mark.parametrize(("valid", "titles"), [(1.0, ["the estimated position is frozen"]), (0.0, [])])
+def test_a_position_that_the_estimator_says_it_does_not_know_is_not_frozen(valid: float, titles: list[str]) -> None:
+    found = frozen(px4("vehicle_local_position", valid))
+    assert [one.title for one in found if "position" in one.title] == titles
 
 
 def test_a_healthy_px4_flight_freezes_nothing() -> None:
@@ -318,3 +327,14 @@ def test_a_battery_of_which_the_current_dies_is_named_once(whole: bool) -> None:
 
 def test_a_healthy_drive_freezes_nothing(tmp_path: Path) -> None:
     assert not frozen(examine(run_model(open_log(Drive().write(tmp_path / "drive.mcap")))).findings)
+
+
+@pytest.mark.parametrize(("sinks", "titles"), [(False, ["the localisation"]), (True, [])])
+def test_a_pose_that_tells_a_depth_alone_is_not_frozen(sinks: bool, titles: list[str]) -> None:
+    t = np.arange(0.0, 80.0, 0.5)
+    turned = {f"pose.pose.orientation.{axis}": 0 * t + (axis == "w") for axis in "xyzw"}
+    places = {"pose.pose.position.x": 0 * t, "pose.pose.position.y": 0 * t, "pose.pose.position.z": -0.01 * t * sinks}
+    odometry = Table(t, {"pose.pose.position.x": 0.5 * t, "pose.pose.position.y": 0 * t, **turned})
+    (source,) = (one for one in SOURCES if one.message == LOCALISED)
+    found = frozen_of(source, "/depth", Table(t, {**places, **turned}), {"/odom": odometry})
+    assert [one.source.name for one in found] == titles

@@ -69,6 +69,9 @@ SOURCES = (
     Live("actuator_outputs", _axes("output", 8), "the record of the motor outputs", "motor", _s("outputs", 10.0), _ANY,
          is_optional=True, mission_lost=ASIDE),
 )  # fmt: skip
+_VALID = {("vehicle_local_position", "x"): "xy_valid", ("vehicle_local_position", "z"): "z_valid"}
+"""What an estimator says of its own numbers, by the topic and the first of them: it fills with zeros what it does not
+know (VehicleLocalPosition.msg)."""
 _DEGREES = 1e7
 """Before 1.14 latitudes are integers of 1e-7 degrees."""
 _METRES = 111_319.5
@@ -85,6 +88,7 @@ READS: Wanted = merge_needs((
     *({source.message: source.fields} for source in SOURCES),
     *({topic: fields} for topic, (_, _, fields) in _ZEROS.items()),
     *({topic: ("fix_type", "satellites_used")} for topic in _PLACES),
+    *({topic: (valid,)} for (topic, _), valid in _VALID.items()),
     {_BATTERY: ("connected",)},
 ))  # fmt: skip
 
@@ -93,7 +97,7 @@ def frozen(model: RunModel, moving: Sequence[Span]) -> Iterator[Frozen]:
     """Every stretch in which a source says the same while others tell that the vehicle moved, in spans aloft."""
     tables = model.tables(READS)
     for source in (one for one in SOURCES if one.message in tables):
-        table = tables[source.message]
+        table = _known(tables[source.message], source)
         fields = [field for field in source.fields if field in table.columns]
         columns = [table[field] for field in fields]
         if not fields or (source.message in _ZEROS and all(map(says_nothing, columns))) or _sees_nothing(table):
@@ -107,6 +111,12 @@ def frozen(model: RunModel, moving: Sequence[Span]) -> Iterator[Frozen]:
                 if motion.reaches(source.moved):
                     yield Frozen(source, source.message, span, count, motion)
                     break
+
+
+def _known(table: Table, source: Live) -> Table:
+    """What a source says without what it says itself not to know."""
+    valid = _VALID.get((source.message, source.fields[0]), "")
+    return table.where(table[valid] != 0) if valid in table.columns else table
 
 
 def unconnected(model: RunModel, hovering: Sequence[Span]) -> Iterator[Unconnected]:

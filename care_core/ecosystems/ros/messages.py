@@ -181,7 +181,7 @@ MESSAGES: Mapping[str, RosMessage] = {
     ),
     NAVIGATION: RosMessage({"feedback.distance_remaining": _number("m", "distance to the goal", _FAR_M)}),
     ACTION_RESULT: _reads("status.goal_id.id", "status.status", "status.text"),
-    LOCALISED: RosMessage(_POSE, reads=tuple(_POSE), at_most=20_000, label="poses"),
+    LOCALISED: RosMessage(_POSE, reads=(*_POSE, HEIGHT), at_most=20_000, label="poses"),
     **dict.fromkeys((POSE, "geometry_msgs/TransformStamped"), _reads(label="poses")),
     FIX: _reads("status.status", "latitude", "longitude", at_most=20_000, label="satellite positions"),
     **dict.fromkeys(("sensor_msgs/Image", "sensor_msgs/CompressedImage"), _reads(label="images")),

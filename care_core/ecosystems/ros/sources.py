@@ -15,6 +15,7 @@ from care_core.ecosystems.coverage import Span
 from care_core.ecosystems.liveness import ASIDE, Frozen, Live, Motion, least, numberless, ranged, repeats, turned
 from care_core.ecosystems.ros.messages import (
     BATTERY,
+    HEIGHT,
     IMU,
     LOCALISED,
     MESSAGES,
@@ -48,7 +49,7 @@ _TWIST = MESSAGES[TWIST].reads
 SOURCES = (
     Live(ODOMETRY, (*_PLACE, *_TURNED), "the odometry", "localisation", _s("odometry", 2.0), _DRIVEN),
     Live(IMU, MESSAGES[IMU].reads[1:], "the IMU", "imu", _s("IMU", 2.0), _DRIVEN),
-    Live(LOCALISED, (*_PLACE, *_TURNED), "the localisation", "localisation", _s("localisation", 5.0),
+    Live(LOCALISED, (*_PLACE, HEIGHT, *_TURNED), "the localisation", "localisation", _s("localisation", 5.0),
          least(way_m=_FOUND_M), records=3),
     Live(BATTERY, ("voltage", "current"), "the battery's monitor", "battery", _s("battery", 30.0),
          least(way_m=_DRAWN_M), is_optional=True, mission_lost=ASIDE),
