@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,9 +15,12 @@ from numpy.typing import NDArray
 from care_core.ecosystems.findings import Health
 from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros import ECOSYSTEM
+from care_core.ecosystems.ros.checks import imu as felt
 from care_core.ecosystems.ros.checks import odometry
 from care_core.ecosystems.ros.checks.messages import gist, reported
+from care_core.ecosystems.ros.messages import IMU, MESSAGES
 from care_core.ecosystems.ros.node_messages import Report
+from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SCAN, SUCCEEDED, TWIST, Drive
@@ -863,3 +867,18 @@ def test_a_position_that_moves_has_moved_though_no_speed_is_told(tmp_path: Path)
     (told,) = [text for text in texts if text.startswith("its positions lie within")]
     assert told.endswith("its odometry tells no speed")
     assert "the robot never moved" not in texts
+
+
+@pytest.mark.parametrize(
+    ("rest", "is_in_g"), [((0.0, 0.05, 1.03), True), ((0.0, 0.5, 9.8), False), ((0.0, 0.0, 0.0), False)]
+)
+def test_an_acceleration_in_g_is_told(rest: tuple[float, float, float], *, is_in_g: bool) -> None:
+    """Of an IMU on a robot that shakes: in g, in m/s^2, and in m/s^2 with gravity taken off."""
+    rng, t = np.random.default_rng(0), np.arange(0.0, 20.0, 0.1)
+    columns = dict.fromkeys(MESSAGES[IMU].reads, 0 * t)
+    for axis, level in zip("xyz", rest, strict=True):
+        columns[f"linear_acceleration.{axis}"] = level + rng.normal(0.0, 0.3, len(t))
+    drive = SimpleNamespace(of=lambda _type: [("/imu", Table(t, columns))], duration_s=20.0, odometry=None)
+    assert [one.title for one in felt.find(cast("Any", drive))] == (
+        ["the IMU tells its acceleration in g, not in m/s^2"] if is_in_g else []
+    )

@@ -26,16 +26,46 @@ TIP_DEG = LIMITS.add(
 LEAST_MPS2 = LIMITS.add("least usual acceleration", 7.8, "m/s2", "gravity, 9.8, less a badly scaled sensor's error")
 MOST_MPS2 = LIMITS.add("greatest usual acceleration", 11.8, "m/s2", "gravity and a badly scaled sensor's error")
 BEFORE_S = LIMITS.add("shocks that belong to a fall come so long before", 3.0, "s", "a choice: a robot tips in one")
+_ASIDE = LIMITS.add(
+    "probability that an acceleration in other units costs the mission", 0.05, "", "few filters fuse it"
+)
 MESSAGES_FELT = LIMITS.add("messages of an IMU", 50, "", "fewer do not tell what is usual")
+_GRAVITY_MPS2 = 9.81
 
 
 def find(drive: Drive) -> Iterator[Finding]:
-    """Shocks and tilt, of a robot that drives."""
+    """Shocks and tilt, of a robot that drives, and an acceleration in other units than the standard's."""
+    yield from _in_g(drive)
     if drive.odometry is None or drive.commands is None:
         return
     for topic, table in drive.of(IMU):
         if holds(table, IMU) and len(table) >= MESSAGES_FELT:
             yield from _felt(drive, topic, table)
+            return
+
+
+def _in_g(drive: Drive) -> Iterator[Finding]:
+    """An IMU that says 1 where gravity is 9.8 m/s^2. Where gravity is taken off, the mean of each axis is near 0."""
+    for topic, table in drive.of(IMU):
+        if not holds(table, IMU) or len(table) < MESSAGES_FELT:
+            continue
+        axes = [believable(table, IMU, f"linear_acceleration.{axis}") for axis in "xyz"]
+        if not np.isfinite(axes).any(axis=1).all():
+            continue
+        size = float(np.linalg.norm([float(np.nanmean(axis)) for axis in axes]))
+        if LEAST_MPS2 <= size * _GRAVITY_MPS2 <= MOST_MPS2:
+            yield Finding(
+                kind="imu",
+                title="the IMU tells its acceleration in g, not in m/s^2",
+                onset_s=0.0,
+                end_s=drive.duration_s,
+                severity="info",
+                evidence=f"{topic} says {size:.2f} on average, where gravity is {_GRAVITY_MPS2:g} m/s^2",
+                source=f"{topic}; REP 103: SI units",
+                suspect="parameter",
+                probability=0.9,
+                mission_lost=_ASIDE,
+            )
             return
 
 
