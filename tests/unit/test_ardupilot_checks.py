@@ -1073,3 +1073,18 @@ def test_home_that_is_set_as_it_is_armed_is_no_climb() -> None:
     t, height = made.flight().estimated_height or (np.empty(0), np.empty(0))
     assert float(np.max(height[t < ARMED_S + 2])) < 1.0
     assert float(np.max(height)) == pytest.approx(12.0, abs=1.0)
+
+
+@pytest.mark.parametrize(("growth", "oscillates"), [(2.6, True), (1.0, False)])
+def test_swings_that_grow_until_control_is_lost_are_an_oscillation(growth: float, *, oscillates: bool) -> None:
+    """Of two half swings a second: as they grow, and as one push turns it over."""
+    made = Made(rate_hz=25.0)
+    swings = np.clip(np.floor((made.t - 50.0) * 2), 0, 5)
+    rate = np.where(made.after(50.0, 53.0), 4.0 * growth**swings * np.sin(2 * np.pi * (made.t - 50.0)), made.noise(0.5))
+    tumbles = made.after(53.0)
+    made.table["RATE"] = {"R": rate, "P": made.noise(0.5), "RDes": made.noise(0.5), "PDes": made.noise(0.5)}
+    made.table["ATT"]["Roll"] = np.where(tumbles, 150.0, np.cumsum(rate) / 25.0)
+    made.table["CTUN"]["ThO"][tumbles] = 0.9
+    titles = [one.title for one in every_finding(made.find())]
+    assert ("roll oscillates" in titles) is oscillates
+    assert "control was lost" in titles

@@ -7,6 +7,7 @@ healthy training flights the error is below 7 degrees for 95 % of the time, in t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -70,6 +71,11 @@ _SPENT = LIMITS.add(
     "31 of 34 such training flights fail; all 106 that swing have a gain raised or the gyros' filter lowered",
 )  # fmt: skip
 _SWINGS = LIMITS.add("probability of any other swing", 0.2, "", "a choice: the motors have more to give")
+_GROWS = LIMITS.add("growth of each swing that gets out of hand", 1.5, "", "a choice: gusts come and go")
+_SWUNG_UP = LIMITS.add("swings to either side that grow", 4, "", "a choice: two or three are a blow and what rights it")
+_LEAST_DPS = LIMITS.add("least of them", 3.0, "deg/s", "a choice: a hover's own movements")
+_LENGTHENS = LIMITS.add("times as long as the one before", 3.0, "", "a choice: a swing keeps its time")
+_OUT_OF_HAND = LIMITS.add("probability of a swing that grows until control is lost", 0.6, "", "a choice")
 _ENOUGH = 10
 _GAINS = ("ATC_RAT_", "ATC_ANG_", "INS_GYRO_FILTER", "INS_HNTCH_", "INS_HNTC2_")
 
@@ -84,7 +90,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         yield from _spins(flight)
     if not flight.is_copter:
         return
-    swung = list(swings(flight))
+    swung = list(swings(flight)) or list(_swung_up(flight))
     yield from swung
     if flight.lost_control_s is None and not swung:
         yield from _far(flight)
@@ -299,6 +305,51 @@ def swings(flight: Flight) -> Iterator[Finding]:
         suspect="parameter",
         probability=_SPENT if spent or down else _SWINGS,
     )
+
+
+def _swung_up(flight: Flight) -> Iterator[Finding]:
+    """Rates that swing further to either side each time until control is lost: the rate controllers are unstable. What
+    a blow or a dead motor does comes at once."""
+    lost, table = flight.lost_control_s, flight.one("RATE", "R", "P")
+    if lost is None or table is None:
+        return
+    grown = [(name, *_growing(table.t, table[axis], lost)) for axis, name in (("R", "roll"), ("P", "pitch"))]
+    name, start, sizes = max(grown, key=lambda one: len(one[2]))
+    if len(sizes) < _SWUNG_UP or sizes[-1] < SWING_DPS:
+        return
+    yield Finding(
+        kind="tuning",
+        title=f"{name} oscillates",
+        onset_s=start,
+        end_s=lost,
+        severity="critical",
+        evidence=(
+            f"the {name} rate swings from side to side, further each time: "
+            f"{', '.join(f'{size:.0f}' for size in sizes)} deg/s; then control is lost"
+        ),
+        source="RATE",
+        suspect="parameter",
+        probability=_OUT_OF_HAND,
+    )
+
+
+def _growing(t: Floats, rate: Floats, lost: float) -> tuple[float, list[float]]:
+    """When a rate began to swing further to either side each time, up to the swing in which control was lost, and how
+    far each went."""
+    edges = np.flatnonzero(np.diff(np.sign(rate)) != 0) + 1
+    begins = np.concatenate(([0], edges)).astype(int)
+    begins = begins[t[begins] <= lost] if len(t) else begins
+    start, sizes = lost, list[float]()
+    end, lasted = int(np.searchsorted(t, lost)) if len(t) else 0, math.inf
+    for begin in begins[::-1].tolist():
+        size = float(np.max(np.abs(rate[begin : max(end, begin + 1)])))
+        took = float(t[min(end, len(t) - 1)] - t[begin])
+        is_next = not sizes or (sizes[0] >= _GROWS * size and took < _LENGTHENS * lasted)
+        if size < _LEAST_DPS or not is_next:
+            break
+        start, end, lasted = float(t[begin]), begin, took if sizes else math.inf
+        sizes.insert(0, size)
+    return start, sizes
 
 
 def _is_as_shipped(flight: Flight) -> bool:
