@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
-from care_core.diagnose.records import Diagnosis, Fix, helps
+from care_core.diagnose.records import Diagnosis, Fix, Hypothesis, helps
 from care_core.ecosystems.findings import (
     IDLED,
     KILLED,
@@ -103,6 +103,9 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
         return f"ask why the motors were cut, and check what the fall broke; then try it {trial(run)}"
     if any(one.title in (IDLED, STEERED) for one in findings):
         return f"look at how it was steered: its throttle stick was down; then try it {trial(run)}"
+    swung = next((one.title for one in findings if one.kind == "tuning" and one.severity == "critical"), None)
+    if swung is not None:
+        return f"look at the gains and filters of what swings ({swung}); then try it {trial(run)}"
     misled = [name for name in named if symptoms[name] not in UPSETS]
     return f"look at what this names: {listed(misled)}; then try it {trial(run)}" if misled else bench(run)
 
@@ -122,9 +125,14 @@ def _named(diagnosis: Diagnosis) -> tuple[str, ...]:
     leading = first if first is not None and first.what in ("hardware", "world") else None
     if part is None:
         return (leading.name,) if leading is not None else ()
-    if leading is None or leading.name == part.title or leading.probability <= LIKELY:
+    if leading is None or leading.name == part.title or not _leads(leading):
         return (part.title,)
     return leading.name, part.title
+
+
+def _leads(first: Hypothesis) -> bool:
+    """Whether a part or circumstance is likely enough to be looked at before any other."""
+    return first.what in ("hardware", "world") and first.probability > LIKELY
 
 
 def _undone(diagnosis: Diagnosis) -> str:
@@ -132,7 +140,8 @@ def _undone(diagnosis: Diagnosis) -> str:
     findings = diagnosis.health.findings
     part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
     if part is not None:
-        return "charge or replace the battery" if is_pack(part) else ""
+        is_aside = part.severity != "critical" and first is not None and _leads(first) and first.name != part.title
+        return "charge or replace the battery" if is_pack(part) and not is_aside else ""
     if first is not None and first.name == OUTLASTED:
         return "land earlier, or fly with a fuller, larger or newer battery"
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)

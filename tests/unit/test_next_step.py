@@ -17,6 +17,7 @@ from care_core.ecosystems.findings import (
     Finding,
     FindingKind,
     Health,
+    Severity,
 )
 from care_core.records import replace
 from care_core.report.document import build_document, remembered_verdict
@@ -127,6 +128,24 @@ def test_a_symptom_is_no_part_to_check() -> None:
     lost = Finding("attitude", "control was lost", 50.0, 60.0, "critical", "", "", probability=0.3)
     named = replace(failed(lost), hypotheses=(Hypothesis("hardware", lost.title, 0.7), Hypothesis("chance", "", 0.3)))
     assert next_step(named, has_failed=True) == bench(named.run)
+
+
+def test_what_swung_until_control_was_lost_has_no_motor_to_check() -> None:
+    lost = Finding("attitude", "control was lost", 55.0, 60.0, "critical", "", "")
+    swings = Finding("tuning", "roll oscillates", 50.0, 60.0, "critical", "", "", "parameter", 0.6)
+    said = next_step(failed(replace(swings, followed_by=(lost,))), has_failed=True)
+    assert said.startswith("look at the gains and filters of what swings (roll oscillates); then try it in the")
+
+
+@pytest.mark.parametrize(("severity", "is_pack"), [("warning", False), ("critical", True)])
+def test_a_battery_that_held_comes_after_what_ended_the_run(severity: Severity, *, is_pack: bool) -> None:
+    link = Finding("radio", "the radio link was lost", 50.0, 60.0, "critical", "", "", probability=0.9)
+    empty = Finding("battery", "the battery was not charged", 0.0, 60.0, severity, "", "", probability=0.9)
+    told = (empty, link) if is_pack else (link, empty)
+    ended = replace(failed(*told), hypotheses=(Hypothesis("hardware", link.title, 0.8),))
+    assert (next_step(ended, has_failed=True) == "charge or replace the battery") is is_pack
+    if not is_pack:
+        assert "the radio link was lost" in next_step(ended, has_failed=True)
 
 
 def test_where_nothing_failed_no_part_is_named() -> None:
