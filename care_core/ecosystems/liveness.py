@@ -29,6 +29,7 @@ _VARIED = LIMITS.add(
     "different samples besides", 10, "", "a choice: a part that is not fitted says one thing all along"
 )
 _MISSED = LIMITS.add("share of the time that was not recorded", 0.2, "", "a choice: checks say so where they saw less")
+_SILENT_S = LIMITS.add("silence to the end of a flight", 5.0, "s", "EKF2: a height that is so old is given up")
 _LASTS_S = LIMITS.add("shortest time of which this is said", 10.0, "s", "a choice: less is over before it is recorded")
 ASIDE = LIMITS.add("probability that what nothing steers by costs the mission", 0.05, "", "a choice: failsafes read it")
 UNPOWERED_V = LIMITS.add(
@@ -198,6 +199,26 @@ def findings(
             source=f"{channel}: {', '.join(source.fields)}",
             probability=PROBABILITY,
             mission_lost=source.mission_lost,
+        )
+
+
+def fell_silent(t: Floats, source: Live, spans: Sequence[Span]) -> Iterator[Finding]:
+    """What is said of a source that stops for good while its vehicle goes on, and is in the log no more."""
+    times = ascending(t)
+    if len(times) < _RECORDS or not any(start < times[-1] < end for start, end in spans):
+        return
+    usual_s, end_s = float(np.median(np.diff(times))), spans[-1][1]
+    quiet_s = end_s - float(times[-1])
+    if quiet_s > max(_SILENT_S, _HABIT * usual_s):
+        yield Finding(
+            kind=source.kind,
+            title=f"{source.name} falls silent",
+            onset_s=float(times[-1]),
+            end_s=end_s,
+            severity="warning",
+            evidence=f"nothing for the last {quiet_s:.0f} s, one every {usual_s:.2g} s before",
+            source=source.message,
+            probability=PROBABILITY,
         )
 
 

@@ -191,7 +191,7 @@ def test_a_path_by_a_frozen_receiver_is_none() -> None:
 # PX4
 
 
-def px4(name: str = "", valid: float | None = None) -> tuple[Finding, ...]:
+def px4(name: str = "", valid: float | None = None, ends: tuple[str, float] = ("", 100.0)) -> tuple[Finding, ...]:
     rng, t = np.random.default_rng(0), np.arange(0.0, 100.0, 0.1)
 
     def noise(size: float) -> Any:
@@ -220,7 +220,10 @@ def px4(name: str = "", valid: float | None = None) -> tuple[Finding, ...]:
         }
     if valid is not None:
         tables["vehicle_local_position"]["xy_valid"] = np.full(len(t), valid)
-    log = TablesLog({one: Table(t, columns) for one, columns in tables.items()}, 100.0, formats.PX4_ULG,
+    made = {one: Table(t, columns) for one, columns in tables.items()}
+    if ends[0]:
+        made[ends[0]] = made[ends[0]].between(0.0, ends[1])
+    log = TablesLog(made, 100.0, formats.PX4_ULG,
                     {"vehicle": "multicopter"})  # fmt: skip
     return examine(run_model(log)).findings
 
@@ -338,3 +341,10 @@ def test_a_pose_that_tells_a_depth_alone_is_not_frozen(sinks: bool, titles: list
     (source,) = (one for one in SOURCES if one.message == LOCALISED)
     found = frozen_of(source, "/depth", Table(t, {**places, **turned}), {"/odom": odometry})
     assert [one.source.name for one in found] == titles
+
+
+@pytest.mark.parametrize(("last_s", "titles"), [(60.0, ["the barometer falls silent"]), (93.0, [])])
+def test_a_sensor_that_falls_silent_on_px4_is_named(last_s: float, titles: list[str]) -> None:
+    found = px4(ends=("vehicle_air_data", last_s))
+    assert [one.title for one in found if one.title.endswith("falls silent")] == titles
+    assert not [one for one in found if one.title.startswith("vehicle_air_data was recorded")]

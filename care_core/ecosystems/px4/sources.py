@@ -69,6 +69,8 @@ SOURCES = (
     Live("actuator_outputs", _axes("output", 8), "the record of the motor outputs", "motor", _s("outputs", 10.0), _ANY,
          is_optional=True, mission_lost=ASIDE),
 )  # fmt: skip
+SENSORS = tuple(one for one in SOURCES if one.message in ("vehicle_air_data", "vehicle_magnetometer", *_PLACES))
+"""Those whose topic ends where no sensor of theirs is left."""
 _VALID = {("vehicle_local_position", "x"): "xy_valid", ("vehicle_local_position", "z"): "z_valid"}
 """What an estimator says of its own numbers, by the topic and the first of them: it fills with zeros what it does not
 know (VehicleLocalPosition.msg)."""
