@@ -1088,3 +1088,11 @@ def test_swings_that_grow_until_control_is_lost_are_an_oscillation(growth: float
     titles = [one.title for one in every_finding(made.find())]
     assert ("roll oscillates" in titles) is oscillates
     assert "control was lost" in titles
+
+
+@pytest.mark.parametrize(("hit_s", "title"), [(52.0, "it hit the ground at 9.0 m/s"), (80.0, "it crashed")])
+def test_what_lay_on_the_ground_for_long_did_not_end_by_a_later_blow(hit_s: float, title: str) -> None:
+    made = Made()
+    made.rows["ERR"] = [(50.0, {"Subsys": 12.0, "ECode": 1.0})]
+    made.rows["MSG"] = [(hit_s, {"Message": "SIM Hit ground at 9.0 m/s"})]
+    assert [one.title for one in every_finding(made.find()) if one.kind == "crash"] == [title]

@@ -384,6 +384,12 @@ class Airborne(Armed):
         return min((t for t in (*hits, self._impact_of_lost_s) if t is not None), default=None)
 
     @property
+    def ending_hit(self) -> Hit | None:
+        """The hit that ended its flight; None where it was down long before that, and only moved on."""
+        hit, down = self.hit, self.impact_s
+        return None if hit is None or down is None or hit.time_s > down + _HIT_LOST_S else hit
+
+    @property
     def _impact_of_lost_s(self) -> float | None:
         crash = min((t for t, code in self.errors(_ERR_CRASH) if code > 0), default=None)
         lost = self.lost_control_s

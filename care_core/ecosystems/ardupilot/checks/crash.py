@@ -62,7 +62,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         is_said = told is not None or said is not None
         shown = (
             "the firmware says: crash" if is_said else "control was lost, and it came down" if lost is not None else "",
-            "" if flight.hit is None else flight.hit.said,
+            "" if flight.ending_hit is None else flight.ending_hit.said,
             steered,
             "no throttle was given since it was armed: does it estimate its attitude rightly?" if undriven else "",
             "a blow came before control was lost" if flight.blow_s is not None else "",
@@ -86,7 +86,8 @@ def _what(flight: Flight, steered: str) -> str:
         return STEERED
     if flight.struck_s is not None:
         return "it hit something"
-    return "it crashed" if flight.hit is None else f"it hit {flight.hit.what} at {flight.hit.speed_ms:.1f} m/s"
+    hit = flight.ending_hit
+    return "it crashed" if hit is None else f"it hit {hit.what} at {hit.speed_ms:.1f} m/s"
 
 
 def _stranded(flight: Flight) -> Iterator[Finding]:

@@ -126,7 +126,7 @@ def crash_of(mission: Mission) -> str:
 
 def hit_of(mission: Mission) -> Hit | None:
     """The contact with the ground at speed that ended the mission, None where there was none."""
-    hit = flight_of(mission).hit
+    hit = flight_of(mission).ending_hit
     return hit if hit is not None and mission.start_s <= hit.time_s <= mission.end_s + SAID_AFTER_S else None
 
 
