@@ -19,6 +19,7 @@ from care_core.ecosystems.ros.checks import imu as felt
 from care_core.ecosystems.ros.checks import odometry
 from care_core.ecosystems.ros.checks.messages import gist, reported
 from care_core.ecosystems.ros.messages import IMU, MESSAGES
+from care_core.ecosystems.ros.motion import odometry_of
 from care_core.ecosystems.ros.node_messages import Report
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
@@ -882,3 +883,22 @@ def test_an_acceleration_in_g_is_told(rest: tuple[float, float, float], *, is_in
     assert [one.title for one in felt.find(cast("Any", drive))] == (
         ["the IMU tells its acceleration in g, not in m/s^2"] if is_in_g else []
     )
+
+
+@pytest.mark.parametrize("is_of_parent", [True, False])
+def test_a_twist_along_the_axes_of_the_map_is_told_and_turned(is_of_parent: bool) -> None:
+    t = np.arange(0.0, 40.0, 0.1)
+    yaw = 0.1 * t
+    east, north = np.sin(yaw) * 5.0, (1 - np.cos(yaw)) * 5.0
+    ahead, aside = (0.5 * np.cos(yaw), 0.5 * np.sin(yaw)) if is_of_parent else (np.full_like(t, 0.5), 0 * t)
+    table = Table(t, {
+        "pose.pose.position.x": east, "pose.pose.position.y": north, "pose.pose.orientation.x": 0 * t,
+        "pose.pose.orientation.y": 0 * t, "pose.pose.orientation.z": np.sin(yaw / 2),
+        "pose.pose.orientation.w": np.cos(yaw / 2), "twist.twist.linear.x": ahead, "twist.twist.linear.y": aside,
+        "twist.twist.angular.z": np.full_like(t, 0.1),
+    })  # fmt: skip
+    told = odometry_of("/odom", table)
+    assert told is not None
+    assert told.is_of_parent is is_of_parent
+    np.testing.assert_allclose(told.speed, 0.5, atol=1e-6)
+    np.testing.assert_allclose(told.sideways, 0.0, atol=1e-6)

@@ -39,6 +39,11 @@ _NEARLY_ALL, _A_SECOND = 0.99, 1.0
 IN_TURN_M, IN_TURN, BACK = 0.02, 0.25, 0.3
 """Two steps in a row that go so much beyond what its speed explains, and together do not, but for this share of them:
 where so many of its samples are such, two publishers send in turn. Noise at rest is a tenth of that step."""
+_OFF_MPS, _FITS = 0.05, 0.2
+"""A twist is of the parent frame where it is so far from what its position does as the robot looks, and this share of
+that from what it does as the map lies."""
+_OVER = 3
+"""Steps over which that is compared: encoders count in steps of their own."""
 _FEWEST = 3
 """Samples without which there is no movement to speak of."""
 
@@ -66,6 +71,8 @@ class Odometry(Record, eq=False):
     """To what was upright at first, deg."""
     numberless_s: Floats
     """When messages without numbers were recorded, shape (m,)."""
+    is_of_parent: bool = False
+    """Whether its twist was told in the frame of its position, and was turned into the robot's here."""
 
     @property
     def dt(self) -> Floats:
@@ -201,7 +208,7 @@ def odometry_of(topic: str, table: Table) -> Odometry | None:
     good = np.isfinite(x + y + speed + sideways + turn)
     frames = table[FRAME][good].tolist() if FRAME in table.columns else []
     t, clock = when_made(table), _clock(table)
-    return Odometry(
+    told = Odometry(
         topic=topic,
         frame=str(frames[0]) if frames else "",
         recorded_s=table.t[good],
@@ -217,6 +224,33 @@ def odometry_of(topic: str, table: Table) -> Odometry | None:
         tilt=tilt_of(table, ODOMETRY, "pose.pose.orientation")[good],
         numberless_s=table.t[~good],
     )
+    return _turned_to_the_robot(told) if _tells_of_parent(told) else told
+
+
+def _turned_to_the_robot(told: Odometry) -> Odometry:
+    cos, sin = np.cos(told.yaw), np.sin(told.yaw)
+    forward, sideways = told.speed * cos + told.sideways * sin, told.sideways * cos - told.speed * sin
+    return replace(told, speed=forward, sideways=sideways, is_of_parent=True)
+
+
+def _tells_of_parent(told: Odometry) -> bool:
+    """Whether its twist is that of its position along the axes of the map, where nav_msgs/Odometry wants it along those
+    of the robot: only where it turns they differ."""
+    if len(told.t) <= _OVER:
+        return False
+    dt = told.clock[_OVER:] - told.clock[:-_OVER]
+    steps = (dt > 0) & (dt < STALE_S * _OVER)
+    along, across = ((one[_OVER:] - one[:-_OVER])[steps] / dt[steps] for one in (told.x, told.y))
+    yaw, said_x, said_y = (
+        np.convolve(one, np.full(_OVER, 1 / _OVER), "valid")[1:][steps]
+        for one in (np.unwrap(told.yaw), told.speed, told.sideways)
+    )
+    moves = np.hypot(along, across) > STANDS_MPS
+    if np.count_nonzero(moves) < _ENOUGH:
+        return False
+    ahead, aside = along * np.cos(yaw) + across * np.sin(yaw), across * np.cos(yaw) - along * np.sin(yaw)
+    off = float(median(np.hypot(said_x - ahead, said_y - aside)[moves]))
+    return off > _OFF_MPS and float(median(np.hypot(said_x - along, said_y - across)[moves])) < _FITS * off
 
 
 def _clock(table: Table) -> Floats | None:

@@ -59,6 +59,9 @@ PLACES = LIMITS.add("transforms of map -> odom", 3, "", "fewer show no step")
 FOUND_S = LIMITS.add("time to find the robot on the map", 5.0, "s", "the first corrections are large")
 PUSHED_S = LIMITS.add("time after a contact that is not compared", 10.0, "s", "a choice: it pushes, or backs off")
 HELD_S = LIMITS.add("time that it stands against commands", 1.0, "s", "odometry that repeats itself stands for less")
+ASIDE = LIMITS.add(
+    "probability that a twist in the other frame costs the mission", 0.1, "", "a choice: few drive by it"
+)
 BEFORE_S = LIMITS.add("time before it that is not either", 1.0, "s", "a choice: who tells of it is late")
 PAUSE_S = LIMITS.add("pause between samples", STALE_S, "s", "over a longer one the speed is not known")
 
@@ -67,6 +70,8 @@ def find(drive: Drive) -> Iterator[Finding]:
     """Odometry that cannot be, that jumps, drifts or comes from two publishers, and a localisation that jumps."""
     odometry = drive.odometry
     yield from _unusable(drive)
+    if odometry is not None and odometry.is_of_parent:
+        yield _of_parent(drive, odometry)
     if odometry is not None and not odometry.stands_still:
         yield from _impossible(drive, odometry)
     if odometry is not None and len(odometry.in_turn):
@@ -75,6 +80,25 @@ def find(drive: Drive) -> Iterator[Finding]:
         yield from _jumps(drive, odometry)
         yield from _drift(drive, odometry)
     yield from _corrections(drive)
+
+
+def _of_parent(drive: Drive, odometry: Odometry) -> Finding:
+    """A twist along the axes of the map: what drives by it believes that the robot slides sideways, and slows down."""
+    return Finding(
+        kind="localisation",
+        title="odometry tells its speed in the frame of its position, not in the robot's",
+        onset_s=0.0,
+        end_s=drive.duration_s,
+        severity="warning",
+        evidence=(
+            "its twist along x and y is what its position does along x and y, whichever way the robot looks; "
+            "nav_msgs/Odometry has it in child_frame_id"
+        ),
+        source=odometry.topic,
+        suspect="parameter",
+        probability=0.9,
+        mission_lost=ASIDE,
+    )
 
 
 def _unusable(drive: Drive) -> Iterator[Finding]:
