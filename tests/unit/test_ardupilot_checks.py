@@ -283,6 +283,15 @@ def test_a_receiver_whose_velocity_never_fits_tells_of_no_jump() -> None:
     assert not [one for one in made.find() if "jumps" in one.title]
 
 
+def test_two_vehicles_whose_records_take_turns_make_no_jump() -> None:
+    made = Made()
+    place = {name: np.full_like(made.t, made.table["GPS"][name][0]) for name in ("Lat", "Lng")}
+    made.table["GPS"] |= place | {"Spd": np.zeros_like(made.t)}
+    other = made.after(FAILS_S, FAILS_S + 2.0) & (np.arange(len(made.t)) % 2 == 0)
+    made.table["GPS"]["Lat"][other] += 14.0 * METRE
+    assert not [one for one in made.find() if "jumps" in one.title]
+
+
 @pytest.mark.parametrize(("pace", "jumps"), [(1.3, False), (9.0, True)])
 def test_records_that_waited_for_the_link_are_timed_by_the_receiver(pace: float, *, jumps: bool) -> None:
     """Of a simulation that runs at its own pace; a clock that keeps no time times nothing."""

@@ -47,6 +47,7 @@ _LONG_S = LIMITS.add("critical loss of the fix", 5.0, "s", "a choice: the estima
 _RATIO = LIMITS.add("test ratio of the estimator", 1.0, "", "AP_NavEKF3: above it the position is rejected")
 _HACC_M = LIMITS.add("accuracy of the position", 10.0, "m", "twice what the firmware's checks want")
 _SACC_MS = LIMITS.add("accuracy of the speed", 3.0, "m/s", "three times what the firmware's checks want")
+_TURNS = LIMITS.add("records that lie elsewhere between two of one place", 2, "", "a choice: one may be a glitch")
 _CLOCK = LIMITS.add("pace of the receiver's clock, either way", 2.0, "", "a choice: simulators run at their own pace")
 _METRES, _DAY_MS = 111319.5, 86_400_000.0
 _FIX = 3
@@ -101,6 +102,8 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     fixed = fixed.where(new)
     if len(fixed) < 3:
         return
+    if _of_two(fixed):
+        return
     t = fixed.t
     off, dt = _unexplained(fixed)
     limit = JUMP_M + 0.25 * ACCELERATION * np.minimum(dt, 1.5) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
@@ -135,6 +138,15 @@ def _is_late(table: Table) -> Mask:
         return np.zeros(len(table), dtype=bool)
     behind = np.maximum.accumulate(table["GMS"]) - table["GMS"]
     return np.asarray((behind > 0) & (behind < _DAY_MS))
+
+
+def _of_two(table: Table) -> bool:
+    """Whether records of two vehicles take turns: one lies elsewhere, and the next to the last digit where the one
+    before did, again and again. A receiver that was led astray comes back to within its noise, and not at once."""
+    lat, lng = table["Lat"], table["Lng"]
+    is_back = (lat[2:] == lat[:-2]) & (lng[2:] == lng[:-2])
+    metres = np.hypot(lat[1:-1] - lat[:-2], (lng[1:-1] - lng[:-2]) * np.cos(np.radians(lat[0]))) * _METRES
+    return int(np.count_nonzero(is_back & (metres > JUMP_M))) >= _TURNS
 
 
 def _unexplained(table: Table) -> tuple[Floats, Floats]:
