@@ -70,6 +70,8 @@ MESSAGES: Dictionary = {
         "vy": Field("m/s", "speed east"),
         "vz": Field("m/s", "speed down"),
         "heading": Field("rad", "heading"),
+        "xy_valid": Field(label="whether the position is known, 1 where it is"),
+        "z_valid": Field(label="whether the height is known, 1 where it is"),
     }),
     "vehicle_local_position_setpoint": Message({
         "x": Field("m", "position north wanted", is_position=True),
