@@ -1105,3 +1105,11 @@ def test_what_lay_on_the_ground_for_long_did_not_end_by_a_later_blow(hit_s: floa
     made.rows["ERR"] = [(50.0, {"Subsys": 12.0, "ECode": 1.0})]
     made.rows["MSG"] = [(hit_s, {"Message": "SIM Hit ground at 9.0 m/s"})]
     assert [one.title for one in every_finding(made.find()) if one.kind == "crash"] == [title]
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_gyros_disagree_by_an_offset_and_not_by_swings_that_the_record_turns_into_slow_ones(stays: bool) -> None:
+    made = Made()
+    apart = np.full_like(made.t, 9.0) if stays else 14.0 * np.sin(2 * np.pi * made.t / 40.0)
+    made.table["IMU#2"]["GyrX"] += np.where(made.after(UP_S, DOWN_S), np.radians(apart), 0.0)
+    assert ("the gyros disagree" in [one.title for one in every_finding(made.find())]) is stays
