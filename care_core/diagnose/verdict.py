@@ -152,7 +152,8 @@ class Advice(Record):
             return ""
         if self.cause is None:
             return f" ({self.confidence} confidence in the cause)"
-        return f" ({percent(self.cause)} the cause, {self.confidence} confidence)"
+        together = " together" if ", " in self.change else ""
+        return f" ({percent(self.cause)} the cause{together}, {self.confidence} confidence)"
 
 
 class Verdict(Record):

@@ -149,9 +149,19 @@ class FixPage(FiguredPage, DiagnosisPage):
             if shown.why_not_measured:
                 rows.append(warning("Odds", f"not measured: {shown.why_not_measured}"))
             rows += [warning("Unless", f"it happens again: {title}") for title in session.diagnosis.lost_by]
+            rows += [
+                warning("Unless", f"{name} acts again, of which training knows nothing") for name in self._unknown()
+            ]
         if option is not None:
             rows += [Row(Content()), *option_rows(option, self._caveats(option), self.glyphs)]
         return rows
+
+    def _unknown(self) -> tuple[str, ...]:
+        """The parameter that leads what explains the run, where no profile models it and it stays as it is."""
+        first = next(iter(self.session.diagnosis.hypotheses), None)
+        known = {option.name for option in self.session.case.options} if self.session.case is not None else set()
+        left = {"", *known, *self.session.basket.ticked}
+        return (first.name,) if first is not None and first.what == "parameter" and first.name not in left else ()
 
     # The odds over the values of the option under the cursor
 

@@ -10,7 +10,7 @@ from care_core.diagnose.records import Diagnosis, Fix, ObjectiveResult, Predicti
 from care_core.diagnose.verdict import verdict_of
 from care_core.records import Record
 from care_core.run import Run
-from care_core.text import clean
+from care_core.text import clean, listed
 from care_core.variables import Variable
 from care_tui.basket import possible
 from care_tui.render.odds import promise
@@ -85,6 +85,9 @@ def option_item(
 
 def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs) -> list[Row]:
     """What every objective should become, as bars of how likely each is kept."""
+    if fix.changes and not fix.predicted:
+        named = listed([clean(change.option.name) for change in fix.changes])
+        return [Row(Content(f"No values are predicted: training knows too little of what {named} does here."))]
     width = max((len(clean(result.variable.name)) for result in objectives), default=0)
     rows = []
     for result in objectives:

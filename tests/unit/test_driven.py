@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from care_core.ecosystems.ardupilot.checks.settings import driven
+from care_core.ecosystems.ardupilot.checks.settings import driven, standing
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table
@@ -84,3 +84,48 @@ def test_one_that_waits_to_be_set_off_names_what_it_waits_for(name: str, value: 
 def test_one_that_was_set_off_and_one_that_waits_for_nothing_are_fine() -> None:
     assert not list(driven.CHECK.find(drive(AUTO_KICKSTART=2.0)))
     assert not list(driven.CHECK.find(drive(throttle=0.0)))
+
+
+SKID = {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0, "SERVO1_TRIM": 1500.0, "SERVO3_TRIM": 1500.0}
+
+
+def skid(speed: np.ndarray, turn: np.ndarray, steer: np.ndarray, left: np.ndarray, **settings: float) -> Flight:
+    """A skid-steered rover that is asked for no throttle."""
+    tables = {
+        "THR": Table(T, {"ThrOut": np.zeros_like(T), "DesSpeed": np.zeros_like(T), "Speed": speed}),
+        "STER": Table(T, {"SteerOut": steer, "TurnRate": turn}),
+        "RCOU": Table(T, {"C1": left, "C3": np.full_like(T, 1500.0)}),
+        "MODE": Table(np.array([0.0]), {"ModeNum": np.array([10.0])}),
+        "ARM": Table(np.array([10.0, 115.0]), {"ArmState": np.array([1.0, 0.0])}),
+    }
+    defaults = {**SKID, "SERVO1_REVERSED": 0.0, "SERVO3_REVERSED": 0.0, "WP_PIVOT_DELAY": 0.0}
+    values = {**defaults, **settings}
+    known = {name: (Setting(name, value, "PARM", default=defaults[name]),) for name, value in values.items()}
+    return flight_of(tables, known, ROVER, 120.0)
+
+
+@pytest.mark.parametrize(("reversed_", "turned"), [(1.0, 0.0), (0.0, 0.0), (1.0, 40.0)])
+def test_one_side_that_turns_round_drives_where_it_steers(reversed_: float, turned: float) -> None:
+    runs = np.where(UNDER_WAY, 4.0, 0.0)
+    steers = np.where(UNDER_WAY, -4500.0, 0.0)
+    flight = skid(runs, np.where(UNDER_WAY, turned, 0.0), steers, np.full_like(T, 1500.0), SERVO1_REVERSED=reversed_)
+    told = [one.wanted for one in driven.CHECK.find(flight) if one.title == "it drives where it steers"]
+    assert told == ([(("SERVO1_REVERSED", 0.0),)] if reversed_ and not turned else [])
+
+
+@pytest.mark.parametrize(("trim", "moves"), [(1274.0, True), (1274.0, False), (1500.0, True)])
+def test_an_output_off_its_middle_drives_it_while_it_is_disarmed(trim: float, moves: bool) -> None:
+    before = T < 10
+    turn = np.where(before & moves, -63.0, 0.0)
+    flight = skid(np.zeros_like(T), turn, np.zeros_like(T), np.full_like(T, trim), SERVO1_TRIM=trim)
+    told = [one.wanted for one in standing.CHECK.find(flight)]
+    assert told == ([(("SERVO1_TRIM", 1500.0),)] if moves and trim != 1500.0 else [])
+
+
+@pytest.mark.parametrize(("delay", "severity"), [(30.0, "critical"), (8.0, "warning"), (0.0, None)])
+def test_it_stands_as_long_as_the_delay_before_it_turns_on_the_spot(delay: float, severity: str | None) -> None:
+    stands = (T >= 40) & (40 + delay >= T)
+    speed = np.where(UNDER_WAY & ~stands, 2.0, 0.0)
+    flight = skid(speed, np.zeros_like(T), np.zeros_like(T), np.full_like(T, 1500.0), WP_PIVOT_DELAY=delay)
+    told = [(one.severity, one.wanted) for one in standing.CHECK.find(flight)]
+    assert told == ([] if severity is None else [(severity, (("WP_PIVOT_DELAY", 0.0),))])

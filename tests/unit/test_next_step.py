@@ -165,6 +165,18 @@ def test_what_can_be_put_right_at_once_comes_first() -> None:
     assert said == "put SERVO2_FUNCTION back as the findings say, then try it in the simulator or a low hover"
 
 
+def test_of_two_motors_that_were_switched_off_both_are_switched_on() -> None:
+    off = [
+        Finding(
+            "tuning", f"{name} was changed in flight", 19.0, 20.0, "critical", "", "", "parameter", parameters=(name,)
+        )
+        for name in ("SERVO2_FUNCTION", "SERVO4_FUNCTION")
+    ]
+    told = replace(failed(*off), hypotheses=(Hypothesis("parameter", "SERVO2_FUNCTION", 0.9),))
+    said = next_step(told, has_failed=True)
+    assert said.startswith("put SERVO2_FUNCTION and SERVO4_FUNCTION back as the findings say")
+
+
 def test_a_change_that_was_chosen_by_hand_does_not_come_before_what_failed() -> None:
     chosen = replace(failed(THRUST, fixed=True), abstained="too little thrust: nothing is changed until that is mended")
     assert next_step(chosen, has_failed=True).startswith("check on the bench: too little thrust; then try it")

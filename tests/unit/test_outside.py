@@ -285,6 +285,19 @@ def test_options_that_stand_beside_it_are_changed_with_it(recorded: Path) -> Non
     assert {change.option.name for change in diagnosis.fix.changes} == {"LAND_ALT_LOW", "PSC_VELXY_P"}
 
 
+def test_flights_that_failed_alike_are_told_by_the_nearest_values() -> None:
+    texts = {value: outside_text("TKOFF_RPM_MIN", value, "tipped") for value in (5781.0, 10000.0)}
+    assert texts[10000.0].endswith("simulated flights with it at 10000 failed in this way")
+    assert "with it at 200, 1000 and 10000" in texts[5781.0]
+
+
+def outside_text(name: str, value: float, sign: str) -> str:
+    signs = Signs(frozenset({sign}), frozenset({sign, "no_takeoff", "stuck"}))  # type: ignore[arg-type]
+    off = off_parameters(setting(name, value, 0.0), COPTER, (), None)
+    (found,) = outside_suspects(off, signs, EVERYTHING, "copter")  # type: ignore[arg-type]
+    return found.text
+
+
 def test_its_fix_has_the_notes_of_its_documentation() -> None:
     found = lead("GPS_TYPE2", 19, [named("GPS_TYPE2", ("GPS_TYPE2", 0.0))])
     fix = outside_fix(found, 0.7, made_run())  # type: ignore[arg-type]

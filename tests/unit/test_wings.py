@@ -235,3 +235,45 @@ def test_a_rudder_that_its_trim_holds_over_is_shown_by_the_bank(trim: float, ban
     title = "it flies straight with a bank: the rudder is held over"
     named = [one.parameters for one in flown.find() if one.title == title]
     assert named == ([("SERVO4_TRIM",)] if told else [])
+
+
+@pytest.mark.parametrize(("trim", "held", "wanted"), [
+    (1155.0, 1494.0, (("SERVO1_TRIM", 1500.0),)),  # where it flies straight the default is meant
+    (1400.0, 1620.0, (("SERVO1_TRIM", 1620.0),)),
+    (1400.0, 1410.0, None),  # a trim of one's own that is right
+    (1500.0, 1500.0, None),
+])  # fmt: skip
+def test_an_aileron_trim_is_where_straight_flight_holds_it(
+    trim: float, held: float, wanted: tuple[tuple[str, float], ...] | None
+) -> None:
+    flown = MadePlane()
+    flown.settings |= {"SERVO1_TRIM": trim, "SERVO1_MIN": 1100.0, "SERVO1_MAX": 1900.0}
+    flown.table["RCOU"]["C1"] = flown.table["RCOU"]["C1"] - 1500.0 + held
+    title = "the trim of the ailerons is not their middle"
+    named = [one.wanted for one in every_finding(flown.find()) if one.title == title]
+    assert named == ([] if wanted is None else [wanted])
+
+
+def test_an_elevator_that_trims_the_speed_as_well_has_no_wrong_trim() -> None:
+    flown = MadePlane()
+    flown.settings |= {"SERVO2_TRIM": 1440.0}
+    flown.table["RCOU"]["C2"] = flown.table["RCOU"]["C2"] + 10.0
+    assert found(flown, "surface") is None
+    flown.settings |= {"SERVO2_TRIM": 1200.0}
+    finding = found(flown, "surface")
+    assert finding is not None
+    assert (finding.title, finding.wanted) == ("the trim of the elevator is not its middle", (("SERVO2_TRIM", 1500.0),))
+
+
+@pytest.mark.parametrize("offset", [0.0, 2000.0])
+def test_a_surface_whose_trim_is_off_is_not_reversed(offset: float) -> None:
+    """Out by 45 % of its travel in straight flight, it turns the plane left when it is out by less than that."""
+    flown = MadePlane()
+    now = flown.after(50.0, 53.0)
+    flown.table["AETR"]["Ail"] = flown.table["AETR"]["Ail"] + offset
+    flown.table["AETR"]["Ail"][now] = 1800.0
+    flown.table["PIDR"]["Tar"][now] = 10.0
+    flown.table["PIDR"]["Act"][now] = -20.0
+    flown.table["ATT"]["Roll"][now] -= 20.0 * (flown.t[now] - 50.0)
+    titles = [one.title for one in every_finding(flown.find())]
+    assert ("the ailerons turn the plane the wrong way" in titles) == (offset == 0.0)

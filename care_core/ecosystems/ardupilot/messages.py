@@ -118,7 +118,7 @@ _FLIGHT: Dictionary = {
             "SAlt": Field("m", former=("SonAlt",)),
             "CRt": Field("cm/s", "climb rate", ("CRate",)),
             "DCRt": Field("cm/s", former=("DCRate",)),
-            "ThO": Field(label="throttle, 0 to 1", former=("ThrOut",)),
+            "ThO": Field(label="throttle", former=("ThrOut",)),
             "ThI": Field(former=("ThrIn",)),
             "ThrOut": Field(label="throttle"),
             "As": Field("m/s", "airspeed", former=("Aspd",)),
