@@ -20,7 +20,7 @@ from care_core.diagnose.fixes import (
 )
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.next_step import KEPT
-from care_core.diagnose.outside.change import Advisable, check_first, outside_fix, refused_beside
+from care_core.diagnose.outside.change import Advisable, asked_by_refusals, check_first, outside_fix, refused_beside
 from care_core.diagnose.parts import mend_first, set_wrong, was_refused
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
@@ -59,10 +59,12 @@ def of_outside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothes
 
 
 def with_refusals(advised: Advised, failed: FailedRun, promise: Promise) -> Advised:
-    """The advised change with what else keeps the vehicle from arming: two checks that refuse it both have to pass."""
-    if advised.abstained is not None or not advised.fixes:
+    """The advised change with what else keeps the vehicle from arming: two checks that refuse it both have to pass. A
+    parameter that a check names has one value, the one that its finding says."""
+    if advised.abstained is not None or not advised.fixes or not was_refused(failed.findings):
         return advised
-    fix = advised.fixes[0]
+    fix = _as_asked(advised.fixes[0], failed, promise)
+    advised = replace(advised, fixes=(fix, *advised.fixes[1:]))
     named = {change.option.name: change.suggested for change in fix.changes}
     more = refused_beside(failed.findings, failed.run, {*named, *failed.query.config})
     if not more:
@@ -71,6 +73,19 @@ def with_refusals(advised: Advised, failed: FailedRun, promise: Promise) -> Advi
     options = {name: value for name, value in named.items() if name in failed.query.config}
     odds = _without(failed, promise, outside, options)
     return replace(advised, fixes=(replace(fix, changes=(*fix.changes, *more), p_fixed=odds), *advised.fixes[1:]))
+
+
+def _as_asked(fix: Fix, failed: FailedRun, promise: Promise) -> Fix:
+    """The fix with the values that refusals ask for, where they name its options."""
+    query, asked = failed.query, asked_by_refusals(failed.findings)
+    changed = {one.option.name: one.suggested for one in fix.changes}
+    if fix.shown_by or changed.keys() - query.config:
+        return fix
+    wanted = {name: asked[name] for name in changed if name in asked and query.variables[name].accepts(asked[name])}
+    config = {**changed, **wanted}
+    if config == changed:
+        return fix
+    return to_fix(query, config, float(promise.odds([{**query.config, **config}])[0]))
 
 
 def _without(failed: FailedRun, promise: Promise, outside: Collection[str], options: Assignment) -> float:
