@@ -78,10 +78,7 @@ class McapPart:
         except BrokenRecordError as err:
             self.flaws.setdefault(key, Flaw(str(err), chunk.pos, self._index.first_ns(at)))
             return None
-        if unpack.takes_parts:  # what is not read cannot be summed up
-            if not chunk.is_whole:
-                self.flaws.setdefault(key, Flaw("a chunk is cut short", chunk.pos, self._index.first_ns(at)))
-        elif chunk.pos not in self._checked:
+        if not unpack.takes_parts and chunk.pos not in self._checked:  # what is not read cannot be summed up
             self._checked.add(chunk.pos)
             why = chunk.flaw(*found)
             if why:

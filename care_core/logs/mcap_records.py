@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from typing import Any, NamedTuple
 
@@ -36,7 +36,7 @@ _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<BQHIqQ")
 _STORED = np.dtype({"names": ["channel", "time"], "formats": ["<u2", "<i8"], "offsets": [9, 15], "itemsize": 31})
 """What of a message's record goes into an index."""
-_CHUNK = struct.Struct("<QQQII")
+_CHUNK = struct.Struct("<QqQII")
 _FOOTER = struct.Struct("<QQI")
 _CHUNK_INDEX = struct.Struct("<QQQ")
 _SIZE = struct.Struct("<Q")
@@ -57,6 +57,8 @@ class McapChunk(Record, eq=False):
     compression: str = ""
     size: int = 0
     """Bytes of the plain records."""
+    until_ns: int | None = None
+    """Its last record time, as its header says it."""
     checksum: int = 0
     """CRC-32 of the plain records, 0 where the recorder made none."""
     index: ChunkIndex = field(default_factory=dict)
@@ -86,9 +88,9 @@ class McapChunk(Record, eq=False):
         return unpack.stretch(self.start, self.end, self.size, needed)
 
     def flaw(self, buffer: Source, begin: int, end: int) -> str:
-        """Why the plain records cannot all be trusted, empty where they can."""
+        """Why the plain records cannot all be trusted, empty where they can, or where the walk told it: a cut chunk."""
         if not self.is_whole:
-            return "a chunk is cut short"
+            return ""
         if self.compression and end - begin < self.size:
             return "the rest of a chunk cannot be unpacked"
         if self.checksum and _checksum(buffer, begin, end) != self.checksum:
@@ -153,9 +155,10 @@ def read_contents(log: FileBytes) -> McapContents:
             if contents.chunks:  # where its index is cut short, topics are missing from it: `_complete` makes it anew
                 contents.chunks[-1].index.clear()
             resumed = next((known for known in _summarised(log) if known > pos), None)
-            contents.flaws[f"record {pos}"] = Flaw(str(err), pos, cuts=resumed is None)
             if resumed is None:
+                contents.flaws[f"record {pos}"] = _cut(str(err), pos, contents.chunks)
                 break
+            contents.flaws[f"record {pos}"] = Flaw(str(err), pos)
             pos = resumed
     if not contents.is_closed and not contents.flaws:
         contents.flaws["end"] = Flaw("the recording was not closed", size, cuts=True)
@@ -169,6 +172,13 @@ def read_contents(log: FileBytes) -> McapContents:
     for chunk in contents.chunks:
         chunk.index.clear()  # held once
     return contents
+
+
+def _cut(why: str, pos: int, chunks: Sequence[McapChunk]) -> Flaw:
+    """The file's end in its record at a position. What is there of a cut chunk is read."""
+    if not chunks or chunks[-1].is_whole:
+        return Flaw(why, pos, cuts=True)
+    return Flaw(why, chunks[-1].end, cuts=True, until_ns=chunks[-1].until_ns)
 
 
 def locate(buffer: Source, begin: int, end: int, offset: int, number: int, time_ns: int) -> tuple[int, int]:
@@ -283,7 +293,7 @@ def _chunk(log: FileBytes, record: _Record) -> McapChunk:
     name_at = record.start + _CHUNK.size
     if name_at > end:
         raise BrokenRecordError("its last record is cut short")
-    _, _, size, checksum, name_size = _CHUNK.unpack(log[record.start : name_at])
+    _, until_ns, size, checksum, name_size = _CHUNK.unpack(log[record.start : name_at])
     start = name_at + name_size + _SIZE.size
     if name_size > _LONGEST_NAME or start > end:
         raise BrokenRecordError("a chunk's header is broken")
@@ -291,7 +301,7 @@ def _chunk(log: FileBytes, record: _Record) -> McapChunk:
     if start + packed != record.end:
         raise BrokenRecordError("a chunk of the wrong size")
     compression = log[name_at : name_at + name_size].decode("ascii", "replace")
-    return McapChunk(record.pos, start, end, end == record.end, compression, size, checksum)
+    return McapChunk(record.pos, start, end, end == record.end, compression, size, until_ns, checksum)
 
 
 def _complete(log: FileBytes, contents: McapContents) -> None:

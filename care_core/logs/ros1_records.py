@@ -122,9 +122,12 @@ def read_contents(bag: FileBytes) -> BagContents:
             pos = record.end
         except BrokenRecordError as err:
             resumed = next((known for known in _indexed(bag, index_pos) if known > pos), None)
-            contents.flaws[f"record {pos}"] = Flaw(str(err), pos, cuts=resumed is None)
             if resumed is None:
+                is_cut_chunk = bool(contents.chunks) and contents.chunks[-1].end == size
+                read_to = size if is_cut_chunk else pos  # what is there of a cut chunk is read
+                contents.flaws[f"record {pos}"] = Flaw(str(err), read_to, cuts=True)
                 break
+            contents.flaws[f"record {pos}"] = Flaw(str(err), pos)
             pos = resumed
     if index_pos == 0:
         unclosed = Flaw("the recording was not closed, so the bag has no index", len(MAGIC))

@@ -67,12 +67,17 @@ class Connection(Record):
 
 
 class Flaw(Record):
-    """What is broken in a part, at which byte, at which record time; `cuts`: nothing after it is known."""
+    """What is broken in a part, at which byte, at which record time; `cuts`: nothing after it is known.
+
+    Attributes:
+        until_ns: the last record time of what is cut off, where the file says it.
+    """
 
     what: str
     byte: int | None = None
     time_ns: int | None = None
     cuts: bool = False
+    until_ns: int | None = None
 
 
 class BrokenRecordError(Exception):
@@ -392,7 +397,12 @@ class RosLog:
         own = [self._kept(times) for times in part.times_ns.values()]
         end_s = (max((int(times.max()) for times in own if len(times)), default=self._low_ns) - self._low_ns) / 1e9
         whole_s = self._metadata.duration_s
-        of = f" of about {log_time(whole_s, 0)}" if whole_s and whole_s > end_s else ""
+        least_s = self._seconds(flaw.until_ns)
+        of = ""
+        if whole_s and whole_s > end_s:
+            of = f" of about {log_time(whole_s, 0)}"
+        elif least_s and least_s > end_s:
+            of = f" of at least {log_time(least_s, 0)}"
         what = f"{where}read to {log_time(end_s)}{of}, cut at byte {flaw.byte}: {flaw.what}"
         return Damage(what, flaw.byte, end_s)
 

@@ -125,3 +125,27 @@ def test_where_and_when_a_cut_log_ends(tmp_path: Path) -> None:
     assert f" of about 600 s (10:00), cut at byte {cut.byte}: " in cut.what
     assert cut.time_s == pytest.approx(open_log(bag).duration_s)
     assert 0 < open_log(bag).duration_s < 5.9
+
+
+@pytest.mark.parametrize("write", [write_bag, write_mcap], ids=["ros1-bag", "mcap"])
+def test_a_log_that_is_cut_inside_a_chunk_is_cut_where_its_bytes_end(
+    write: Callable[[Path], None], tmp_path: Path
+) -> None:
+    log = tmp_path / "log"
+    write(log)
+    raw = log.read_bytes()
+    log.write_bytes(raw[: len(raw) // 2])
+    read = read_all(log)
+    assert read is not None
+    (cut,) = read[0].damage
+    assert cut.byte == len(raw) // 2
+    assert cut.time_s == pytest.approx(max(table.t[-1] for table in read[1].values() if len(table)))
+
+
+def test_a_cut_chunk_says_how_far_the_log_went_at_least(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    write_mcap(log, chunk_size=1 << 20)
+    raw = log.read_bytes()
+    log.write_bytes(raw[: len(raw) // 3])
+    (cut,) = open_log(log).damage
+    assert " of at least 5.9 s, cut at byte " in cut.what or " of at least 6 s, cut at byte " in cut.what
