@@ -197,6 +197,22 @@ class Variable(Record):
         """The threshold, where it is a multiple of what the reference configuration needs."""
         return self.threshold if self.threshold is not None and self.threshold.ratio is not None else None
 
+    @property
+    def is_yes_or_no(self) -> bool:
+        """Whether an objective is met or not, which no other limit makes another question."""
+        return self.kind == "functional"
+
+    def wrong_limit(self, limit: float) -> str:
+        """Why an operator cannot judge this objective by a limit, one sentence; empty where they can."""
+        own = self.fixed
+        if self.is_yes_or_no:
+            is_own = own is not None and limit == own.value
+            return "" if is_own else f"{self.name} is met or not: it has no other threshold."
+        # Times, energies and errors are amounts.
+        is_at_most = self.threshold is None or self.threshold.op in ("<=", "<")
+        is_amount = own is None or own.bound > 0
+        return "No mission can keep a limit of 0 or less." if is_at_most and is_amount and limit <= 0 else ""
+
     def accepts(self, value: float) -> bool:
         """Whether `value` may be suggested for this option."""
         if self.labels:

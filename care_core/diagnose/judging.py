@@ -350,8 +350,9 @@ def check_wishes(schema: Schema, keep: Iterable[str], thresholds: Mapping[str, f
         _known(name, schema.options, "parameter", "--keep", schema.name)
     for name, bound in thresholds.items():
         objective = _known(name, schema.objectives, "objective", "--threshold", schema.name)
-        if objective.kind == "functional" and bound not in (0, 1):
-            raise UsageError(f"{name} is 0 or 1, never {bound:g}.", hint="Write 0 or 1.", where="--threshold")
+        if wrong := objective.wrong_limit(bound):
+            hint = "Leave it out." if objective.is_yes_or_no else f"Write --threshold {name}=NUMBER with one above 0."
+            raise UsageError(wrong, hint=hint, where="--threshold")
 
 
 def _known(name: str, variables: Iterable[Variable], what: str, where: str, profile: str) -> Variable:

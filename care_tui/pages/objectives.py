@@ -12,7 +12,7 @@ from textual.content import Content
 from care_core.application.proof import Subject
 from care_core.records import replace
 from care_core.text import clean
-from care_core.variables import Threshold
+from care_core.variables import Variable
 from care_tui.messages import Judge
 from care_tui.pages.figured import LEAST_FIGURE
 from care_tui.pages.page import View, enter_to, sentence
@@ -26,17 +26,15 @@ NAME_WIDTH = 18
 JUDGED = "How it was judged"
 
 
-def _wrong(bound: Threshold | None, typed: str) -> str:
+def _wrong(objective: Variable, typed: str) -> str:
     """Why this is no threshold; empty when it is one, or gives the profile's back."""
+    if not typed:
+        return ""
     try:
-        limit = float(typed or 1.0)
+        limit = float(typed)
     except ValueError:
         return f"'{typed}' is not a number."
-    if not math.isfinite(limit):
-        return f"'{typed}' is no threshold."
-    # Times, energies and errors are amounts.
-    is_beyond_reach = bound is not None and bound.op in ("<=", "<") and limit <= 0
-    return "No mission can keep a limit of 0 or less." if is_beyond_reach else ""
+    return objective.wrong_limit(limit) if math.isfinite(limit) else f"'{typed}' is no threshold."
 
 
 class ObjectivesPage(ProvenPage):
@@ -138,14 +136,14 @@ class ObjectivesPage(ProvenPage):
             return
         result = self.session.diagnosis.objectives[self.index]
         variable, bound = result.variable, result.threshold
-        if variable.kind == "functional":
-            self.say(f"{variable.name} is met or not: it has no other threshold.")
+        if variable.is_yes_or_no:
+            self.say(variable.wrong_limit(math.nan))
             return
         unit = f" in {variable.unit}" if variable.unit else ""
         hint = f"A number{unit}; empty takes the profile's threshold again. Enter judges by it, Esc cancels."
         start = "" if bound is None else f"{bound.value:g}"
         sign = "" if bound is None else f" {bound.op}"
-        prompt = Prompt(f"Judge {variable.name} by{sign}", start, hint, partial(_wrong, bound))
+        prompt = Prompt(f"Judge {variable.name} by{sign}", start, hint, partial(_wrong, variable))
         self.app.push_screen(prompt, lambda typed: self._typed(variable.name, typed))
 
     def _typed(self, objective: str, typed: str | None) -> None:

@@ -250,7 +250,8 @@ def test_only_one_format_can_be_printed(care: Care, made: dict[str, Any]) -> Non
         ("--threshold", "energy=much", "--threshold energy=NUMBER"),
         ("--threshold", "energy=nan", "--threshold energy=NUMBER"),
         ("--threshold", "energy=inf", "--threshold energy=NUMBER"),
-        ("--threshold", "mission_success=5", "0 or 1"),
+        ("--threshold", "mission_success=0", "is met or not: it has no other threshold"),
+        ("--threshold", "energy=0", "No mission can keep a limit of 0 or less."),
         ("--profile", "arducoptr", "Did you mean 'arducopter'?"),
     ],
 )
