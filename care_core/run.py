@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Literal, TypeGuard
 
-from care_core.records import Record, field
-from care_core.text import log_time
+from care_core.records import Record, field, replace
+from care_core.text import but_for_numbers, log_time, times_until
 
 
 class Unavailable(Record):
@@ -89,6 +89,17 @@ class Evidence(Record):
     def __str__(self) -> str:
         meaning = f" ({self.says})" if self.says else ""
         return f"this run says: {self.text}{meaning}"
+
+
+def gathered(evidence: Iterable[Evidence]) -> tuple[Evidence, ...]:
+    """The messages, those that differ in nothing but numbers as one, with their count and when the last one was."""
+    groups: dict[object, list[Evidence]] = {}
+    for one in evidence:
+        groups.setdefault((one.kind, but_for_numbers(one.text), one.options, one.says), []).append(one)
+    return tuple(
+        replace(several[0], text=several[0].text + times_until(len(several), several[-1].time_s))
+        for several in groups.values()
+    )
 
 
 class Check(Record):
@@ -228,6 +239,10 @@ class Run(Record):
         """The run's value of a variable of any role, None when the run does not hold it."""
         parts: tuple[Mapping[str, Value], ...] = (self.config, self.context, self.metrics, self.objectives)
         return next((part[name] for part in parts if name in part), None)
+
+    def hearing(self, *others: Evidence) -> Run:
+        """The run with more that speaks about its failure, all of it in order of time."""
+        return replace(self, evidence=tuple(sorted((*self.evidence, *others), key=lambda one: one.time_s)))
 
     @property
     def refused_by(self) -> frozenset[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 import textwrap
 import unicodedata
@@ -92,6 +93,14 @@ def wrapped(text: str, first: str = "", rest: str | None = None, width: int = WI
     return [line.replace("\u00a0", " ") for line in lines]  # what must stand on one line was held together by them
 
 
+_NUMBERS = re.compile(r"\d+(?:\.\d+)?")
+
+
+def but_for_numbers(text: str) -> str:
+    """The text with a sign for every number in it: what differs in nothing else says one thing again."""
+    return _NUMBERS.sub("#", text)
+
+
 LONG_S = 600.0
 """From here on a time of a log has the form of minutes alone where there is little room."""
 
@@ -101,8 +110,13 @@ def log_time(time_s: float | None, digits: int = 1) -> str:
     if time_s is None or not math.isfinite(time_s):
         return "an unknown time"
     shown = round(time_s, digits) + 0.0  # no minus before a zero
-    minutes = f" ({_minutes(shown)})" if abs(shown) >= _MINUTES_FROM_S else ""
+    minutes = f" ({_minutes(time_s)})" if abs(shown) >= _MINUTES_FROM_S else ""
     return f"{shown:.{digits}f} s{minutes}"
+
+
+def times_until(count: int, last_s: float) -> str:
+    """How often something was said, and when last, behind the first of it; nothing of what was said once."""
+    return f" ({count} times until {log_time(last_s, 0)})" if count > 1 else ""
 
 
 def log_times(times_s: Sequence[float | None]) -> list[str]:
@@ -124,8 +138,8 @@ def seconds(time_s: float | None) -> str:
 
 
 def _minutes(time_s: float) -> str:
-    """5:12, from an hour on 1:02:05."""
-    minutes, rest = divmod(math.floor(abs(time_s)), 60)
+    """5:12, from an hour on 1:02:05, to the nearest second as all that is told of a time."""
+    minutes, rest = divmod(round(abs(time_s)), 60)
     hours, minutes = divmod(minutes, 60)
     sign = "-" if time_s < 0 else ""
     return f"{sign}{hours}:{minutes:02}:{rest:02}" if hours else f"{sign}{minutes}:{rest:02}"

@@ -13,7 +13,7 @@ from care_core.diagnose.ranking import Suspect, suspects
 from care_core.diagnose.records import OutsideSuspect
 from care_core.ecosystems.findings import Health
 from care_core.profile.store import Profile
-from care_core.records import Record, replace
+from care_core.records import Record
 from care_core.run import Run, Setting
 
 
@@ -38,7 +38,7 @@ def blame(
     """The causes of a run that missed an objective. `good`: the parameters of the last good run, where one is known."""
     schema, broken = profile.schema, judged.broken
     said = speaking(health.findings, schema, judged.run.config)
-    run = replace(judged.run, evidence=(*judged.run.evidence, *said.values()))
+    run = judged.run.hearing(*said.values())
     found = {
         result.variable.name: suspects(query, result.variable.name, schema.known, run.evidence) for result in broken
     }

@@ -11,6 +11,7 @@ from care_core.diagnose.noisy_or import NoisyOr
 from care_core.diagnose.ranking import Suspect, describe_path, not_ruled_out
 from care_core.diagnose.records import Cause, Confidence, Fault, Fix, Note, ObjectiveResult
 from care_core.records import replace
+from care_core.run import gathered
 
 MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
@@ -148,9 +149,8 @@ def _cause_notes(failed: FailedRun, suspect: Suspect, in_support: bool, support:
     if suspect.option in failed.query.kept:
         notes.append(Note("pinned by --keep: not changed"))
     notes += map(Note, change_notes(failed.profile.schema.variables[suspect.option]))
-    notes += [
-        Note(str(evidence), "in_the_log") for evidence in failed.run.evidence if suspect.option in evidence.options
-    ]
+    speaking = (evidence for evidence in failed.run.evidence if suspect.option in evidence.options)
+    notes += [Note(str(evidence), "in_the_log") for evidence in gathered(speaking)]
     return tuple(notes)
 
 

@@ -96,7 +96,7 @@ def diagnose(
     report = progress or (lambda _step, _share: None)
     schema, broken = profile.schema, judged.broken
     said = speaking(health.findings, schema, judged.run.config)
-    run = replace(judged.run, evidence=(*judged.run.evidence, *said.values()))
+    run = judged.run.hearing(*said.values())
     choice = replace(choice, fit=choice.fit.with_objection(*unusual(run, profile)))
     if not broken:
         return _within_limits(judged, schema, choice, run, said, health, good)

@@ -14,7 +14,7 @@ from care_core.ecosystems.vehicles import is_self_written
 from care_core.logs.base import Table
 from care_core.numbers import Floats, ascending, distinct, median, pauses
 from care_core.run import Damage, Setting, shown
-from care_core.text import log_time
+from care_core.text import but_for_numbers, times_until
 
 Span = tuple[float, float]
 
@@ -27,7 +27,6 @@ _AT_ONCE = ("vehicle", "crash", "failsafe", "error", "event", "arming", "battery
             "mission", "message", "parameter", "log")  # fmt: skip
 """Kinds of events as they stand where several happen at once: what happened before what followed from it."""
 
-_NUMBERS = re.compile(r"\d+(?:\.\d+)?")
 _TELLING = re.compile(
     r"fail|error|lost|loss|crash|glitch|variance|unhealthy|not healthy|inconsistent|critical|low\b|emergency|reset"
     r"|lane|switch|breach|stop|clip|vibration|brown|watchdog|internal|overload|timeout|refus|denied|aborted|warn"
@@ -54,10 +53,10 @@ def repeats(events: Sequence[Event]) -> Iterator[Event]:
     """Moments that differ in nothing but numbers as one, with their count and when the last one was."""
     groups: dict[tuple[str, str], list[Event]] = {}
     for event in events:
-        groups.setdefault((event.kind, _NUMBERS.sub("#", event.text)), []).append(event)
+        groups.setdefault((event.kind, but_for_numbers(event.text)), []).append(event)
     for several in groups.values():
         first = several[0]
-        again = f" ({len(several)} times until {log_time(several[-1].time_s, 0)})" if len(several) > 1 else ""
+        again = times_until(len(several), several[-1].time_s)
         yield Event(first.time_s, first.kind, first.text + again, first.source)
 
 

@@ -12,7 +12,7 @@ from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
 from care_core.report.health import account_lines, finding_lines, reason_lines
 from care_core.report.shared_causes import together
-from care_core.run import Value, is_known, place_of_damage
+from care_core.run import Value, gathered, is_known, place_of_damage
 from care_core.text import listed, log_time, log_times, wrapped
 from care_core.variables import Variable
 
@@ -193,7 +193,7 @@ def _prediction(objective: Variable, fix: Fix, had: Mapping[str, Value]) -> str:
 
 
 def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
-    evidence = diagnosis.run.evidence
+    evidence = gathered(diagnosis.run.evidence)
     if not evidence or not diagnosis.faults:
         return
     yield "Messages of this run"

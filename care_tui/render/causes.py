@@ -11,7 +11,7 @@ from textual.content import Content
 from care_core.diagnose.records import Cause, Diagnosis, Hypothesis, ObjectiveResult, OutsideSuspect, PathNode
 from care_core.diagnose.verdict import hypothesis_text
 from care_core.ecosystems.findings import Finding
-from care_core.run import shown
+from care_core.run import gathered, shown
 from care_core.text import clean, seconds
 from care_core.variables import Variable
 from care_tui.render.fix import prediction
@@ -130,7 +130,7 @@ def evidence_rows(cause: Cause, diagnosis: Diagnosis, dismissed: Mapping[str, st
     told = [Content.assemble(text(first.name, "bold"), " ", text(setting(option, first.value)))]
     told += [Content.assemble(text(node.name, "bold"), " ", text(node_value(node, None))) for node in others[:-1]]
     rows.append(labelled("This run", joined(told, ", ")))
-    said = [part for part in diagnosis.run.evidence if option.name in part.options]
+    said = gathered(part for part in diagnosis.run.evidence if option.name in part.options)
     rows += [labelled("" if i else "The log says", f"{part.text}{meaning(part)}, at {seconds(part.time_s)}")
              for i, part in enumerate(said)]  # fmt: skip
     return rows + [warning("Caveat", note) for note in caveats_of(cause)]

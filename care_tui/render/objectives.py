@@ -9,7 +9,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.verdict import STATUS_WORDS
-from care_core.run import Damage, Evidence, is_known, place_of_damage
+from care_core.run import Damage, Evidence, gathered, is_known, place_of_damage
 from care_core.text import clean, seconds
 from care_tui.render.rows import (
     LABEL_WIDTH,
@@ -132,7 +132,7 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
     if context:
         rows.append(labelled("Met", ", ".join(f"{name} {value:.4g}" for name, value in context.items())))
     if diagnosis.run.evidence:
-        rows += [heading("Messages of this run"), *(evidence_row(part) for part in diagnosis.run.evidence)]
+        rows += [heading("Messages of this run"), *map(evidence_row, gathered(diagnosis.run.evidence))]
     return Rows(rows)
 
 
@@ -141,12 +141,10 @@ def damage(part: Damage) -> str:
     return part.what + place_of_damage(part.what, part.byte, part.time_s, seconds)
 
 
-def evidence_row(part: Evidence, option: str = "") -> Row:
-    """A message of the log; marked where it points at `option`."""
-    points = option and option in part.options
+def evidence_row(part: Evidence) -> Row:
+    """A message of the log."""
     head = f"{seconds(part.time_s):>9}  {clean(part.kind):<9} "
-    tail = "  (points at this parameter)" if points else ""
-    return Row(Content.assemble(head, text(part.text + meaning(part)), (tail, "bold")), len(head))
+    return Row(Content.assemble(head, text(part.text + meaning(part))), len(head))
 
 
 def meaning(part: Evidence) -> str:

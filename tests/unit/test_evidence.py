@@ -25,7 +25,7 @@ from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
-from care_core.run import Evidence, ProfileChoice, Run, Unavailable
+from care_core.run import Evidence, ProfileChoice, Run, Unavailable, gathered
 from care_core.variables import Role, Threshold, Variable
 from tests.planted import OPTIONS, SCHEMA, planted_run
 
@@ -231,3 +231,16 @@ def test_every_recorded_refusal_names_the_option_that_set_its_check_off(recorded
             assert diagnosis.faults[0].causes[0].option.name in diagnosis.run.refused_by
             seen.append(check)
     assert seen
+
+
+def test_messages_that_differ_in_numbers_alone_are_told_once_with_their_count() -> None:
+    again = [Evidence(at, f"Potential Thrust Loss ({1 + at % 2:.0f})", "message", ("size",)) for at in (3.0, 5.0, 9.0)]
+    other = Evidence(4.0, "Crash: Disarming", "crash")
+    assert [one.text for one in gathered([*again, other])] == [
+        "Potential Thrust Loss (2) (3 times until 9 s)", "Crash: Disarming",
+    ]  # fmt: skip
+
+
+def test_what_a_run_says_stands_in_order_of_time() -> None:
+    late, early = Evidence(9.0, "late", "message"), Evidence(2.0, "early", "found")
+    assert replace(planted_run(), evidence=(late,)).hearing(early).evidence == (early, late)

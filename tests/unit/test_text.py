@@ -6,8 +6,10 @@ import ast
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from care_core.text import cell, log_time, log_times
+from care_core.text import LONG_S, but_for_numbers, cell, log_time, log_times, seconds, times_until
 
 CORE = Path(__file__).parents[2] / "care_core"
 
@@ -46,8 +48,20 @@ def test_a_rounded_time_counts_its_minutes_from_what_is_shown() -> None:
     assert log_time(11.2, 0) == "11 s"
 
 
+@given(st.floats(100.1, 1e5))
+def test_a_time_has_the_same_minutes_however_many_decimals_it_is_told_with(time_s: float) -> None:
+    assert log_time(time_s).partition(" (")[2] == log_time(time_s, 0).partition(" (")[2]
+    assert log_time(time_s).endswith(f"({seconds(time_s)})") or time_s < LONG_S
+
+
+def test_what_is_said_again_has_its_count() -> None:
+    assert times_until(1, 305.2) == ""
+    assert times_until(94, 305.2) == " (94 times until 305 s (5:05))"
+    assert but_for_numbers("Potential Thrust Loss (1)") == but_for_numbers("Potential Thrust Loss (4)")
+
+
 def test_times_of_a_column_stand_below_each_other() -> None:
-    assert log_times([8.25, 317.7, None]) == ["  8.2 s       ", "317.7 s (5:17)", "      ?       "]
+    assert log_times([8.25, 317.7, None]) == ["  8.2 s       ", "317.7 s (5:18)", "      ?       "]
     assert log_times([1.0, 12.0]) == [" 1.0 s", "12.0 s"]
     assert log_times([]) == []
 

@@ -47,7 +47,7 @@ from care_core.ecosystems.vehicles import (
     reason_words,
 )
 from care_core.logs.base import Table, Wanted
-from care_core.text import listed, log_time
+from care_core.text import listed, log_time, times_until
 
 READS: Wanted = {
     "MSG": ("Message",),
@@ -237,7 +237,7 @@ def _lasting(times: Sequence[tuple[float, float]]) -> str:
     """How often and until when something was so, of when it began and ended each time (infinity: it did not)."""
     start, end = times[0]
     if len(times) > 1:
-        return f" ({len(times)} times until {log_time(times[-1][0], 0)})"
+        return times_until(len(times), times[-1][0])
     return f", over after {end - start:.1f} s" if math.isfinite(end) else ""
 
 

@@ -11,7 +11,7 @@ from care_core.ecosystems.findings import Finding, FindingKind, Severity, Suspec
 from care_core.ecosystems.px4.flight import Px4Flight, Span
 from care_core.logs.base import Table
 from care_core.records import Record
-from care_core.text import log_time
+from care_core.text import times_until
 
 _BLOW_S = 0.5
 _SHORTEST_SHOWN_S = 0.05
@@ -79,7 +79,7 @@ def episode(
     start = spans[0][0]
     lasts_s = sum(until - since for since, until in spans)
     lasting = (
-        f" ({len(spans)} times until {log_time(spans[-1][0], 0)})" if len(spans) > 1
+        times_until(len(spans), spans[-1][0]) if len(spans) > 1
         else f" for {lasts_s:.1f} s" if lasts_s >= _SHORTEST_SHOWN_S
         else " for an instant"
     )  # fmt: skip
