@@ -5,6 +5,7 @@ It is made of a diagnosis, or of the document of one that was remembered. Needs 
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 from collections.abc import Collection, Sequence
@@ -368,16 +369,28 @@ def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding
     first, *others = [clause for sentence in broken for clause in sentence.split("; ")] or found[:1]
     told = {log_time(one.onset_s) for one in worst if one.kind in ("attitude", "crash")}
     others = [one for one in others if not (one.startswith(_CAME_DOWN) and one.rpartition(" at ")[2] in told)]
-    clauses = (first, *found, *others)
-    return _in_lines(list(dict.fromkeys(clauses)), LINES * LINE - len(f"{STATUS_WORDS['fault']}: ") - LINE // 8)
+    clauses = list(dict.fromkeys((first, *found, *others)))
+    kept = _in_lines(clauses, LINES * LINE - len(f"{STATUS_WORDS['fault']}: ") - LINE // 8)
+    begun_s = min((one.onset_s for one in worst if _with_time(one) in kept), default=-math.inf)
+    early = [one for one in others if one in kept and _time_told(one) < begun_s]
+    return "; ".join(dict.fromkeys((first, *early, *kept)))
 
 
-def _in_lines(clauses: Sequence[str], width: int) -> str:
+_TIME_TOLD = re.compile(r" at (\d+(?:\.\d+)?) s\b")
+
+
+def _time_told(clause: str) -> float:
+    """When it was, by the words of a clause; infinity where they do not say."""
+    told = _TIME_TOLD.search(clause)
+    return float(told[1]) if told else math.inf
+
+
+def _in_lines(clauses: Sequence[str], width: int) -> list[str]:
     """As many of the clauses, the first always, as have room."""
-    kept = clauses[0]
+    kept = list(clauses[:1])
     for clause in clauses[1:]:
-        if len(kept) + len(clause) + 2 <= width:
-            kept = f"{kept}; {clause}"
+        if len("; ".join([*kept, clause])) <= width:
+            kept.append(clause)
     return kept
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from textual.binding import Binding
 from textual.content import Content
 
 from care_core.text import clean
@@ -55,10 +56,18 @@ class DiagnosisPage(Page):
         option = self.option_here() if self.session.state == "data" else None
         return [] if option is None else known_rows(option, self.session.diagnosis.run)
 
+    @property
+    def _next(self) -> str:
+        """The next step that has something to show."""
+        empty = self.session.empty_steps()
+        return next(name for name in (*NAMES[NAMES.index(self.NAME) + 1 :], "report") if name not in empty)
+
+    def label(self, binding: Binding) -> str:
+        return PAGES[self._next].title if binding.action == "open" else super().label(binding)
+
     def go_on(self) -> None:
         """To the next step that has something to show."""
-        empty = self.session.empty_steps()
-        self.go(next(name for name in (*NAMES[NAMES.index(self.NAME) + 1 :], "report") if name not in empty))
+        self.go(self._next)
 
     def action_open(self) -> None:
         """Go on."""

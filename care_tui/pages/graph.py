@@ -47,6 +47,7 @@ class GraphPage(FiguredPage):
         "the variable stands beside it, of a parameter that of what comes of it, with what each was in this run; the "
         "path of this run's cause is marked, and ? stands where few resamples hold an edge."
     )
+    OPENS_ITEM = True
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Go there"),
         Binding("left,h,backspace", "step_back", "Back a step", key_display="h", id="graph.back"),
@@ -164,6 +165,9 @@ class GraphPage(FiguredPage):
             span = f"{figures(summary.low)} to {measure(summary.high, unit)}, middle {measure(middle, unit)}"
             rows.append(labelled("Training", span))
         return rows
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        return len(self._trail) > 1 if action == "step_back" else super().check_action(action, parameters)
 
     def action_open(self) -> None:
         """Go to the neighbour under the cursor."""

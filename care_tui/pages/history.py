@@ -56,6 +56,7 @@ class HistoryPage(FiguredPage):
         "what that brought. x marks a run; then every other is compared with it, and Enter puts both logs side by "
         "side in full. From 120 columns each objective is drawn over the runs, with its limits. / filters, Esc leaves."
     )
+    OPENS_ITEM = True
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Open its log"),
         Binding("x", "mark", "Compare", id="history.mark"),
@@ -139,6 +140,8 @@ class HistoryPage(FiguredPage):
         return past.report.log.sha256 != case.diagnosis.run.log.sha256
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        if action == "mark":
+            return self.index is not None
         return self._may_check if action == "check" else super().check_action(action, parameters)
 
     def _item(self, past: Past) -> Content:

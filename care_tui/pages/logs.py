@@ -54,6 +54,7 @@ class LogsPage(Page):
         "for any other (or drop a file on the terminal). While a log is read, Esc stops it. Nothing is ever written to "
         "a log."
     )
+    OPENS_ITEM = True
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Open"),
         Binding("o", "pick", "Any log", id="logs.pick"),

@@ -32,6 +32,7 @@ class MissionsPage(FiguredPage):
         "The missions of this log with their verdicts. Enter diagnoses the one under the cursor, Esc leaves. From 120 "
         "columns the way of the robot and what happened in the mission stand beside it."
     )
+    OPENS_ITEM = True
     BINDINGS: ClassVar[list[BindingType]] = [enter_to("Diagnose it")]
     _placed = False
 

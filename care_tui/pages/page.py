@@ -50,6 +50,8 @@ class Page(Container):
     HELP: ClassVar[str]
     FITS: ClassVar[bool] = False
     """Whether the text is made for the size of its pane."""
+    OPENS_ITEM: ClassVar[bool] = False
+    """Whether Enter opens the item under the cursor, and does nothing without one."""
     BINDINGS: ClassVar[list[BindingType]] = []
 
     def __init__(self, workspace: Workspace, *, id: str | None = None) -> None:
@@ -118,6 +120,12 @@ class Page(Container):
         """What a key of the page does now, in a word or two."""
         return binding.description
 
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Enter is no key of a page whose list is empty."""
+        if action == "open" and self.OPENS_ITEM:
+            return self.index is not None
+        return super().check_action(action, parameters)
+
     def help_first(self) -> list[Row]:
         """What the help begins with: of what stands under the cursor."""
         return []
@@ -136,6 +144,8 @@ class Page(Container):
             focused = self.screen.focused
             if focused is None or not focused.display or (focused is self.reader and choices.display):
                 self.take_focus()
+        if self.OPENS_ITEM:
+            self.refresh_bindings()
 
     def show_text(self, *, from_top: bool = True) -> None:
         """Show the text about the item under the cursor."""

@@ -77,6 +77,7 @@ async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_
         assert "What would make one fit\n- for arducopter: record CMD\n" in text(app)
         for step in "2345":
             await settle(pilot, step)
+            assert "enter Report" in shown(app), "the footer names the page that Enter reaches"
             assert text(app).startswith("No profile fits this log (it is a rover, the profile is of a copter), so ")
             assert items(app) == ""
             await settle(pilot, "a", "d", "space", "equals_sign", "plus", "u", "f", "c", "o")
@@ -121,6 +122,17 @@ async def test_where_no_profile_fits_what_explains_a_failure_is_ranked_all_the_s
         assert "output 1950 us" in text(app)
         await settle(pilot, "j", "d", "w", "3", "enter")
         assert step_of(app) == 6, "there is no fix and no diff"
+
+
+async def test_enter_is_no_key_of_a_page_whose_list_is_empty(make_app: MakeApp) -> None:
+    app = make_app(sample.unfitting())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        for page in "wy":
+            await settle(pilot, page)
+            assert items(app) == "", page
+            for dead in ("Go there", "Back a step", "Open its log", "Compare"):
+                assert dead not in shown(app), (page, dead)
 
 
 async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_view(make_app: MakeApp) -> None:

@@ -53,8 +53,11 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         await settle(pilot, "w")
         assert title(app).startswith("Around mission_time:")
         first = items(app).splitlines()[0]
+        assert "enter Go there" in shown(app)
+        assert "Back a step" not in shown(app), "it is where it began"
         await settle(pilot, "enter")
         assert f"Around {first.split()[2]}:" in title(app)
+        assert "h Back a step" in shown(app)
         await settle(pilot, "h")
         assert title(app).startswith("Around mission_time:")
         await settle(pilot, "escape", "m")

@@ -134,6 +134,15 @@ def test_the_first_cause_is_told_before_what_followed_and_no_headline_is_longer_
     assert len(wrapped(said)) <= 2
 
 
+def test_what_a_headline_tells_first_happened_first() -> None:
+    failed = ObjectiveResult(
+        SUCCESS, 0.0, SUCCESS.threshold, "fault", "2 of 3 reached; battery failsafe at 252.9 s (4:13)"
+    )
+    sags = Finding("battery", "the battery sags under its load", 331.6, 350.0, "critical", "", "")
+    told = "2 of 3 reached; battery failsafe at 252.9 s (4:13); the battery sags under its load at 331.6 s (5:32)"
+    assert verdict_on([failed], [sags]).failed == told
+
+
 def test_how_it_came_down_is_told_once() -> None:
     short = "1 of 3 waypoints were reached; it hit the ground at 27.3 s; battery failsafe at 27.3 s"
     failed = ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", short)
