@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+from rich.cells import cell_len
 from textual.binding import Binding, BindingType
 from textual.content import Content
 
@@ -17,11 +18,13 @@ from care_core.text import seconds
 from care_tui.pages.page import Page, View, enter_to, sentence, view_of
 from care_tui.pages.proofs import figure_of, signals_in
 from care_tui.render.plot import AXIS, LOWEST, Figure, dots_across, mark_rows
-from care_tui.render.rows import ASCII, Row, Rows, error_rows, padded, text
+from care_tui.render.rows import ASCII, Glyphs, Row, Rows, error_rows, padded, text, without_middle
 from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
 
 NAME_WIDTH = 14
+LEAST_CHANNEL = 6
+"""Cells in which a shortened channel still says something."""
 MOST_TOLD = 6
 """Marks that are told below a plot."""
 SHORTEST_S = 0.5
@@ -30,6 +33,16 @@ PROOF = "proof"
 NOTHING = Proof(())
 
 Span = tuple[float, float]
+
+
+def signal_name(signal: Signal, width: int, glyphs: Glyphs) -> str:
+    """A signal's name in so many cells: where it does not fit, its channel gives way, which many signals share."""
+    room = width - cell_len(signal.field) - 1
+    if room >= cell_len(signal.channel):
+        return signal.name
+    if room < LEAST_CHANNEL:
+        return without_middle(signal.field, width, glyphs)
+    return f"{without_middle(signal.channel, room, glyphs)} {signal.field}"
 
 
 class PlotsPage(Page):
@@ -91,14 +104,15 @@ class PlotsPage(Page):
         title = Content(f"{seconds(self._span[0])} to {seconds(self._span[1])}{at}")
         listing = Listing(
             len(signals),
-            lambda i, _width: (self._item(signals[i]),),
+            lambda i, width: (self._item(signals[i], width),),
             lambda i: f"{signals[i].name} {signals[i].wanted_name} {' '.join(signals[i].used_by)}",
         )
         return View(title, lambda i: self._detail(None if i is None else signals[i], proof), listing)
 
-    def _item(self, signal: Signal) -> Content:
-        mark = self.glyphs.root if signal == self._beside else " "
-        line = Content(f"{mark} ") + padded(signal.name, NAME_WIDTH, "bold")
+    def _item(self, signal: Signal, width: int) -> Content:
+        mark = f"{self.glyphs.root if signal == self._beside else ' '} "
+        name = signal_name(signal, width - len(mark), self.glyphs)
+        line = Content(mark) + padded(name, NAME_WIDTH, "bold")
         if signal.wanted_name:
             line += text(f"  {'beside' if signal.is_beside else 'to follow'} {signal.wanted_name}")
         return line + text("  for " + ", ".join(signal.used_by), "dim") if signal.used_by else line

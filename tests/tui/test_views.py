@@ -11,14 +11,17 @@ import pytest
 from textual.widgets import Input, Static
 
 from care_core.application.case import Case, Request
+from care_core.application.signals import Signal
 from care_core.errors import UsageError
 from care_core.files import bundled
 from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.engine import Engine, open_and_warm
 from care_tui.pages.history import HistoryPage
+from care_tui.pages.plots import signal_name
 from care_tui.places import remember
 from care_tui.render.plot import dots_across, plot
+from care_tui.render.rows import ASCII
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
 from care_tui.settings import Settings
@@ -394,3 +397,12 @@ def test_a_plot_is_as_wide_and_as_high_as_asked_for() -> None:
     assert [line.plain for line in stars] == [" **", " * ", " * "]
     assert dots_across(20, ascii=False) == 40
     assert dots_across(20, ascii=True) == 20
+
+
+def test_signals_of_a_narrow_list_are_told_apart_by_their_fields() -> None:
+    fields = [f"accelerometer_m_s2[{axis}]" for axis in range(3)]
+    names = [signal_name(Signal("sensor_combined", field), 30, ASCII) for field in fields]
+    assert len(set(names)) == 3
+    assert all(len(name) <= 30 and name.endswith(field) for name, field in zip(names, fields, strict=True))
+    assert signal_name(Signal("battery_status", "voltage_v"), 30, ASCII) == "battery_status voltage_v"
+    assert len(signal_name(Signal("a", "long_" * 20), 30, ASCII)) == 30
