@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, open_case
-from care_core.application.open_run import OpenRun
+from care_core.application.open_run import OpenRun, log_of
 from care_core.application.plotting import MOST_PLOTS, marks_in, ranked, segments
 from care_core.application.proof import meanings
 from care_core.application.sharing import EVERYTHING, Sharing
@@ -171,7 +171,12 @@ def compare(a: Request, b: Request, progress: Progress) -> Compared:
 
 
 def beside(a: Request, other: Case, progress: Progress) -> Compared:
-    """Open a log and put it beside an open run, judged by that one's profile where it can be. Raises CareError."""
+    """Open a log and put it beside an open run, judged by that one's profile where it can be. Raises CareError, also
+    where it is the log of another kind of robot."""
+    from care_core.diagnose.since import refuse_another_robot
+    from care_core.logs.opening import open_log
+
+    refuse_another_robot(open_log(a.log), log_of(other), "Name two runs of the same robot.")
     if a.profile is not None or other.reading is None:
         return Compared(open_case(a, progress), other)
     one = open_case(replace(a, profile=str(other.reading.profile.path)), progress)

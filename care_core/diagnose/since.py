@@ -9,7 +9,7 @@ from care_core.configs.driven import readable, same_value
 from care_core.diagnose.judging import Judged, read_and_judge
 from care_core.diagnose.records import Cause, Diagnosis, Note, ParameterChange, Since
 from care_core.diagnose.reference import reference_as_driven
-from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.registry import ecosystem_of, run_model
 from care_core.ecosystems.vehicles import vehicle_of
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.errors import CareError, UsageError
@@ -52,10 +52,7 @@ def compare(judged: Judged, good: Log, profile: Profile) -> Since:
 def is_good(good: Log, log: Log, profile: Profile, thresholds: Mapping[str, float] | None) -> bool:
     """Whether the log of a run that is said to be good holds a run that missed nothing: only then is its configuration
     one to judge by. Raises UsageError where it is of another kind of robot."""
-    one, other_kind = _kind(log), _kind(good)
-    if one != other_kind:
-        what = f"That is the log of a {other_kind}, and this one is of a {one}."
-        raise UsageError(what, hint="Name a good run of the same robot.", where=str(good.path))
+    refuse_another_robot(good, log, "Name a good run of the same robot.")
     try:
         other = read_and_judge(run_model(good), profile, thresholds=thresholds)
     except CareError:
@@ -63,10 +60,19 @@ def is_good(good: Log, log: Log, profile: Profile, thresholds: Mapping[str, floa
     return not any(result.status == "fault" for result in (*other.results, *other.checks))
 
 
+def refuse_another_robot(other: Log, log: Log, hint: str) -> None:
+    """Raise UsageError where another log is of another kind of robot: nothing of the two can be put side by side."""
+    kind, other_kind = _kind(log), _kind(other)
+    if kind != other_kind:
+        what = f"That is the log of a {other_kind}, and this one is of a {kind}."
+        raise UsageError(what, hint=hint, where=str(other.path))
+
+
 def _kind(log: Log) -> str:
-    """What kind of robot wrote a log."""
-    ecosystem = log.format.ecosystem
-    return "robot under ROS" if ecosystem == "ros" else vehicle_of(log.facts, log.settings()).kind or ecosystem
+    """What kind of robot wrote a log: a copter under ArduPilot shares no name of a parameter with one under PX4."""
+    ecosystem = ecosystem_of(log.format)
+    vehicle = "" if ecosystem.name == "ros" else vehicle_of(log.facts, log.settings()).kind
+    return f"{vehicle or 'robot'} under {ecosystem.title}"
 
 
 def with_evidence(diagnosis: Diagnosis, since: Since) -> Diagnosis:

@@ -27,7 +27,8 @@ def test_a_run_that_failed_itself_is_no_reference(care: Care) -> None:
 
 
 def test_another_kind_of_robot_has_no_good_run_to_compare_with(care: Care) -> None:
-    for name, kind in (("ardurover_failed.BIN", "rover"), ("nav2_good.mcap", "robot under ROS")):
+    for name, kind in (("ardurover_failed.BIN", "rover under ArduPilot"), ("nav2_good.mcap", "robot under ROS")):
         done = care("triage", SLOW, "--since", SAMPLES / name, "--no-history")
         assert done.code == ExitCode.USAGE
-        assert f"the log of a {kind}, and this one is of a copter. Name a good run of the same robot." in done.stderr
+        said = f"the log of a {kind}, and this one is of a copter under ArduPilot. Name a good run of the same robot."
+        assert said in done.stderr

@@ -93,7 +93,7 @@ def test_a_run_beside_itself_differs_in_nothing(flights: Compared) -> None:
     assert not any(one.differs for one in document.events)
 
 
-def test_runs_of_different_missions_and_robots_are_said_to_be(flights: Compared, drives: Compared) -> None:
+def test_runs_of_different_missions_and_profiles_are_said_to_be(flights: Compared, drives: Compared) -> None:
     motor = compare_document(care_core.compare(GOOD, ROOT / "samples" / "arducopter_motor.BIN").comparison())
     assert any(one.startswith("the missions differ: legs 5 in A, 3 in B") for one in motor.warnings)
     assert motor.findings[0].title == "motor 4 (rear) lost thrust"
@@ -101,6 +101,14 @@ def test_runs_of_different_missions_and_robots_are_said_to_be(flights: Compared,
     other = compare_document(Compared(flights.a, drives.b).comparison())
     assert any("A was judged by arducopter, B by move_base" in one for one in other.warnings)
     assert other.measures == []
+
+
+def test_a_flight_and_a_drive_are_not_compared(care: Care) -> None:
+    with pytest.raises(UsageError, match=r"the log of a copter under ArduPilot, and this one is of a robot under ROS"):
+        care_core.compare(GOOD, FAILED_DRIVE)
+    refused = care("compare", GOOD, FAILED_DRIVE)
+    assert (refused.code, refused.stdout) == (2, "")
+    assert "Name two runs of the same robot." in refused.stderr
 
 
 def test_the_page_draws_the_signals_of_both_over_each_other(flights: Compared, drives: Compared) -> None:
