@@ -12,6 +12,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Mapping, Sequence
 from functools import cache
 from io import BufferedRandom, BufferedReader, FileIO, StringIO
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import Literal, overload
 
 from care_core import limits
 from care_core.errors import UsageError
+from care_core.text import listed
 
 PROFILE_FILE = "profile.yaml"
 
@@ -191,6 +193,15 @@ def refuse_link(path: Path) -> None:
     if path.is_symlink():
         hint = f"Name the file itself: {os.path.realpath(path)}."
         raise UsageError("This is a link, and links are not written through.", hint=hint, where=str(path))
+
+
+def format_by_ending(path: Path, formats: Mapping[str, Sequence[str]]) -> str:
+    """Which of these formats, each with its endings, the name of a file chooses. Raises UsageError for none."""
+    for name, endings in formats.items():
+        if path.suffix.lower() in endings:
+            return name
+    usual = listed([endings[0] for endings in formats.values() if endings], "or")
+    raise UsageError(f"The file name must end in {usual}.", where=path.name)
 
 
 def is_stream(path: Path) -> bool:

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.errors import UsageError, nearest
+from care_core.files import format_by_ending
 from care_core.records import Record
+from care_core.text import listed
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis
@@ -100,6 +102,8 @@ FORMATS = {
 """By name."""
 FILE_FORMATS = tuple(row for row in FORMATS.values() if row.suffixes)
 """Those that a file's name can choose."""
+ENDINGS = {row.name: row.suffixes for row in FILE_FORMATS}
+"""By name, the endings of files that hold each."""
 
 
 def format_named(name: str) -> Format:
@@ -111,12 +115,11 @@ def format_named(name: str) -> Format:
         raise UsageError(f"There is no report format '{name}'.", hint=hint) from None
 
 
-def format_of(path: Path) -> Format | None:
-    """The format that the suffix of a file stands for, None where it stands for none."""
-    return next((row for row in FILE_FORMATS if path.suffix.lower() in row.suffixes), None)
+def format_of(path: Path) -> Format:
+    """The format that the suffix of a file stands for. Raises UsageError where it stands for none."""
+    return FORMATS[format_by_ending(path, ENDINGS)]
 
 
 def suffixes_text() -> str:
     """The usual suffixes, as they are listed in a sentence."""
-    *others, last = (row.suffixes[0] for row in FILE_FORMATS)
-    return f"{', '.join(others)} or {last}"
+    return listed([row.suffixes[0] for row in FILE_FORMATS], "or")

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from care_core.errors import UsageError
+from care_core.files import format_by_ending, is_stream
 from care_tui.completing import limits, missions, option_names, profile_names
 from care_tui.console import check_writable
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
+
+PLAIN = ("", ".txt")
+"""Endings of files that hold plain text."""
 
 LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="The log to read.", show_default=False)]
 
@@ -44,6 +48,16 @@ def _writable(out: Path | None) -> Path | None:
 def is_json(out: Path | None) -> bool:
     """Whether the file that was named is to hold JSON."""
     return out is not None and out.suffix.lower() == ".json"
+
+
+def format_named_by(out: Path | None, formats: Mapping[str, Sequence[str]]) -> str | None:
+    """The format that the name of a file chooses, None for plain text. Raises UsageError for an unknown ending."""
+    if out is None or is_stream(out) or out.suffix.lower() in PLAIN:
+        return None
+    try:
+        return format_by_ending(out, formats)
+    except UsageError as err:
+        raise UsageError(err.message, hint="Plain text takes .txt.", where="--out") from err
 
 
 Out = Annotated[

@@ -20,6 +20,7 @@ from care_tui.commands.arguments import (
     Thresholds,
     bounds,
     chosen,
+    format_named_by,
     sharing_for,
 )
 from care_tui.console import Progress, emit, painted
@@ -51,8 +52,7 @@ def compare(
     from care_core.diagnose.verdict import verdict_of
 
     asked = chosen({"json": json, "markdown": markdown, "html": html})
-    suffix = "" if out is None else out.suffix.lower()
-    format = asked or next((name for name, ends in FORMATS.items() if suffix in ends), "text")
+    format = asked or format_named_by(out, FORMATS) or "text"
     one = Request(a, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission_a)
     other = Request(b, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission_b)
     with Progress() as progress:

@@ -12,7 +12,7 @@ from care_core.application.case import Case, Request
 from care_core.application.history_writing import remember_triage
 from care_core.errors import ExitCode, LogError, NoRepeatsError, UsageError
 from care_core.records import replace
-from care_core.report.formats import format_of
+from care_core.report.formats import ENDINGS
 from care_core.text import command
 from care_tui.commands.arguments import (
     Anonymous,
@@ -31,6 +31,7 @@ from care_tui.commands.arguments import (
     Thresholds,
     bounds,
     chosen,
+    format_named_by,
     sharing_for,
 )
 from care_tui.commands.opening import newest_named
@@ -88,7 +89,7 @@ def triage(
     from care_tui.browser import show_page
 
     flags = {"json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit}
-    format = chosen(flags) or ("html" if open_page else _format_of(out))
+    format = chosen(flags) or ("html" if open_page else format_named_by(out, ENDINGS))
     if open_page and format != "html":
         raise UsageError(f"What a browser opens is a page, not {format}.", hint="Leave one of both out.")
     found = logs_of(logs or [newest_named()])
@@ -191,12 +192,6 @@ def _short(path: Path) -> str:
     """The sample as it is called in a checkout, else by its path."""
     here = Path("samples", path.name)
     return str(here if here.exists() and here.samefile(path) else path)
-
-
-def _format_of(out: Path | None) -> str | None:
-    """What the name of a file chooses."""
-    row = None if out is None else format_of(out)
-    return None if row is None else row.name
 
 
 def _written(case: Case, format: str | None, sharing: Sharing | None, *, to_file: bool) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from care_core.application.case import Request
-from care_tui.commands.arguments import AsJson, Force, Out, chosen
+from care_tui.commands.arguments import AsJson, Force, Out, chosen, format_named_by
 from care_tui.completing import profile_names
 from care_tui.console import Progress, emit, say
 
@@ -39,8 +39,8 @@ def graph(
     from care_tui.commands.opening import newest_named
 
     format = chosen({"json": json, "dot": dot, "graphml": graphml})
-    if format is None and out is not None:
-        format = next((one for one, (_, ends) in FORMATS.items() if out.suffix.lower() in ends), None)
+    if format is None:
+        format = format_named_by(out, {name: endings for name, (_, endings) in FORMATS.items()})
     if name is None or is_log(name):
         with Progress() as progress:
             document = graph_of_run(Request(Path(name) if name else newest_named()), progress)

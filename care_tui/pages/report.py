@@ -86,7 +86,7 @@ class ReportPage(DiagnosisPage):
         """Show what was written, whatever format the name of the file chose."""
         session = self.session
         format = format_of(path)
-        if format in FILE_FORMATS and format is not session.format:
+        if format is not session.format:
             session.format = format
             self._written_text = None
             self.enter()

@@ -51,10 +51,12 @@ class ExportDialog(ModalScreen[str | None]):
 
     @work(exclusive=True, group="export")
     async def _export(self, path: Path) -> None:
-        format = format_of(path)
-        if format is None:
-            self._say(UsageError(f"The file name must end in {suffixes_text()}."))
-        elif os.path.isdir(path):
+        try:
+            format = format_of(path)
+        except UsageError as err:
+            self._say(err)
+            return
+        if os.path.isdir(path):
             self._say(UsageError("This is a folder.", hint="Name a file in it."))
         elif not os.path.exists(path) or await self.app.push_screen_wait(_replacing(path)):
             error = await self._write(path, format).wait()

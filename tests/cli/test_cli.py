@@ -238,6 +238,18 @@ def test_ingest_chooses_the_profile_by_a_log_that_can_be_read(
     assert "1 log failed" in outcome.stderr
 
 
+@pytest.mark.parametrize("command", ["triage", "compare", "graph"])
+def test_a_file_whose_ending_is_no_format_is_refused(
+    care: Care, flights: tuple[Path, ...], tmp_path: Path, command: str
+) -> None:
+    logs = flights[:1] * (2 if command == "compare" else 1)
+    outcome = care(command, *logs, "--out", tmp_path / "x.pdf")
+    assert (outcome.code, outcome.stdout) == (2, "")
+    assert "The file name must end in ." in outcome.stderr
+    assert "Plain text takes .txt." in outcome.stderr
+    assert not (tmp_path / "x.pdf").exists()
+
+
 def test_only_one_format_can_be_printed(care: Care, made: dict[str, Any]) -> None:
     assert care("triage", "a.BIN", "--json", "--yaml").code == 2
 
