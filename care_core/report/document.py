@@ -329,6 +329,8 @@ class TriageDocument(Document, kw_only=True):
     """What to do next, empty where there is nothing to be done."""
     outside: list[OutsideEntry] = field(default_factory=list)
     """The suspects among the parameters that the profile does not model."""
+    status: Status | None = None
+    """What the run came to; null in a document that was written before it was told apart from `headline`."""
 
 
 class Report(TriageDocument, kw_only=True):
@@ -377,6 +379,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
         hypotheses=[publish(Hypothesis, h, probability=six_digits(h.probability)) for h in diagnosis.hypotheses],
         outside=[publish(OutsideEntry, one, usual=one.back) for one in diagnosis.outside],
         headline=verdict.headline,
+        status=verdict.status,
         next_step=verdict.next_step,
         verdict=verdict,
         diff="" if fix is None else unified_diff(run, fix.changes, by_hand=fix.by_hand),

@@ -31,13 +31,13 @@ from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis
 KEYS = ["schema", "fit", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
 HAPPENED = ["account", "findings", "hypotheses"]
 ADDED = [*HAPPENED, "notes", "sources", "since", "missions", "evidence", "rivals", "tell_more", "dismissed",
-         "odds_as_driven", "headline", "next_step", "outside"]  # fmt: skip
+         "odds_as_driven", "headline", "next_step", "outside", "status"]  # fmt: skip
 
 
 def test_the_document_has_exactly_the_published_keys() -> None:
     document = json.loads(to_json(build_document(made_diagnosis())))
     assert list(document) == [*KEYS, *ADDED]
-    assert document["schema"] == "care.triage/1"
+    assert (document["schema"], document["status"]) == ("care.triage/1", "fault")
     assert list(document["profile"]) == ["name", "version", "platform"]
     assert list(document["log"]) == ["path", "format", "start", "duration_s", "damage", "sha256"]
     assert list(document["objectives"][0]) == [
