@@ -76,8 +76,9 @@ class LearningError(CareError):
     """The runs table cannot carry a model."""
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """A sentence that names the known word closest to `word`, whatever the case, or an empty string."""
+def nearest(word: str, known: Iterable[str], alike: float = 0.6) -> str:
+    """A sentence that names the known word closest to `word`, whatever the case, or an empty string where none is
+    `alike` enough (`difflib`'s ratio, from 0 to 1)."""
     spellings = {one.casefold(): one for one in known}
-    close = get_close_matches(word.casefold(), list(spellings), n=1, cutoff=0.6)
+    close = get_close_matches(word.casefold(), list(spellings), n=1, cutoff=alike)
     return f"Did you mean '{spellings[close[0]]}'?" if close else ""

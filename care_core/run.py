@@ -180,6 +180,8 @@ class ProfileChoice(Record):
     fit: Fit = FITS
     origin: str = ""
     """Where a profile is from that is not CaRE's own and not one of the user's, in a clause; empty for those."""
+    instead: str = ""
+    """The installed profile that fits the log, where the operator named another that does not."""
 
     @property
     def title(self) -> str:

@@ -127,6 +127,10 @@ def _leave_reading(command: Any) -> None:
         _leave_reading(inner)
 
 
+_AS_OPTIONS = 0.75
+"""How alike an option has to be to one that is not there: their dashes alone make any two of them alike by half."""
+
+
 def _in_a_sentence(err: Any) -> UsageError:
     """What is wrong with a command line, as every other error is told; the hidden command of the app is not named."""
     context = err.ctx
@@ -139,7 +143,7 @@ def _in_a_sentence(err: Any) -> UsageError:
         message = err.format_message()
         return UsageError(message if message.endswith((".", "?")) else f"{message}.", hint=listed)
     long = [name for name in known if len(unknown) == 2 and name.startswith(f"-{unknown}")]
-    hint = f"Did you mean '{long[0]}'?" if len(long) == 1 else nearest(unknown, known) or listed
+    hint = f"Did you mean '{long[0]}'?" if len(long) == 1 else nearest(unknown, known, alike=_AS_OPTIONS) or listed
     return UsageError(f"There is no option '{unknown}'.", hint=hint)
 
 

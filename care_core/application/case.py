@@ -214,6 +214,9 @@ def choose(
 
     profiles, known, left_out = _candidates(log, name, configs, said)
     profile, choice = choose_profile(log, profiles, known)
+    if profile is None and name is not None:
+        own, _ = choose(log, None, configs, said)
+        choice = replace(choice, instead="" if own is None else own.schema.name)
     return profile, replace(_from(choice, profiles), reason=f"{choice.reason}{left_out}")
 
 

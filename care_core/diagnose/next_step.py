@@ -81,10 +81,14 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
 def _without_profile(diagnosis: Diagnosis) -> str:
     """What to do with a log that no profile fits and in which nothing is seen to have failed."""
     run = diagnosis.run
+    if diagnosis.profile.instead:
+        return f"take profile {diagnosis.profile.instead}, which fits this log"
     if run.log.format == MAVLINK_TLOG.name and run.log.facts.get("stack") == "PX4":
         return "triage the .ulg that the vehicle itself wrote: profile px4 reads it, and telemetry holds little of it"
     if diagnosis.health.too_little == NOT_FLOWN:
         return "triage a log in which the vehicle was armed; 'care inspect LOG' shows what this one holds"
+    if diagnosis.health.too_little and any(not part.is_jump for part in run.log.damage):
+        return "copy the log from the vehicle again: this file is damaged, and too little is left of it"
     if diagnosis.health.too_little:
         return "'care inspect LOG' shows what this log holds, 'care record PROFILE' what to record"
     return "'care inspect LOG' tells what each profile would need"

@@ -251,6 +251,7 @@ def test_a_log_in_a_folder_that_is_closed_is_said_to_be(care: Care, log: Path, m
         (["--versoin"], "There is no option '--versoin'. Did you mean '--version'?"),
         (["triage", "--jsn"], "There is no option '--jsn'. Did you mean '--json'?"),
         (["-q"], "There is no option '-q'. 'care --help' lists what there is."),
+        (["triage", "--bogus"], "There is no option '--bogus'. 'care triage --help' lists what there is."),
         (["compare", "a"], "Missing argument 'B'. 'care compare --help' lists what there is."),
         (["profiles", "show", "--xyz"], "'care profiles show --help' lists what there is."),
     ],

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+import care_core
+from care_core.application.case import Request
 from care_core.diagnose.next_step import bench, next_step, trial, was_upset
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.diagnose.verdict import verdict_of
@@ -19,12 +21,13 @@ from care_core.ecosystems.findings import (
     Health,
     Severity,
 )
+from care_core.files import bundled
 from care_core.records import replace
 from care_core.report.document import build_document, remembered_verdict
 from care_core.report.reading import remembered
 from care_core.report.terminal import to_text
 from care_core.report.writers import published
-from care_core.run import Check, Evidence
+from care_core.run import Check, Damage, Evidence
 from tests.made import made_diagnosis, made_run
 
 AGAIN = "run the same configuration again: if it fails again, the cause persists"
@@ -84,9 +87,24 @@ def test_telemetry_of_a_px4_vehicle_is_no_log_of_it() -> None:
 def test_what_holds_no_run_is_not_sent_after_profiles(why: str, told: str) -> None:
     made = failed()
     unfit = replace(made.profile, fit=replace(made.profile.fit, verdict="no"))
-    said = next_step(replace(made, profile=unfit, health=replace(made.health, too_little=why)), has_failed=False)
+    sound = replace(made.run, log=replace(made.run.log, damage=()))
+    short = replace(made, profile=unfit, run=sound, health=replace(made.health, too_little=why))
+    said = next_step(short, has_failed=False)
     assert told in said
     assert "profile would need" not in said
+
+
+def test_a_damaged_log_of_which_too_little_is_left_is_copied_again() -> None:
+    made = failed()
+    unfit = replace(made.profile, fit=replace(made.profile.fit, verdict="no"))
+    cut = replace(made.run, log=replace(made.run.log, damage=(Damage("cut in a record", 4),)))
+    short = replace(made, profile=unfit, run=cut, health=replace(made.health, too_little=TOO_SHORT))
+    assert next_step(short, has_failed=False).startswith("copy the log from the vehicle again")
+
+
+def test_a_profile_that_was_named_and_does_not_fit_gives_way_to_the_one_that_does() -> None:
+    case = care_core.triage(Request(bundled("samples", "arducopter_failed.BIN"), "nav2"))
+    assert next_step(case.diagnosis, has_failed=False) == "take profile arducopter, which fits this log"
 
 
 def test_what_drives_is_tried_at_walking_pace() -> None:
