@@ -35,8 +35,8 @@ def messages_of(case: OpenRun) -> list[Event]:
 
 
 def what_would_fit(case: OpenRun) -> list[str]:
-    """What would make a profile fit the log of a case that none fits: by the one for this kind of log and vehicle that
-    misses least, else a profile of its own."""
+    """What would make a profile fit the log of a case that none fits: by the one of which it is told that it does not,
+    or the one for this kind of log and vehicle that misses least, else a profile of its own."""
     from care_core.ecosystems.vehicles import vehicle_of
     from care_core.extract.coverage import to_have, try_on, wrong_kind
     from care_core.extract.fit import is_other_vehicle
@@ -50,7 +50,8 @@ def what_would_fit(case: OpenRun) -> list[str]:
         for schema in schemas
         if not wrong_kind(log, schema) and not is_other_vehicle(schema, vehicle)
     ]
-    nearest = max(tried, key=lambda trial: trial.coverage.found, default=None)
+    told = case.diagnosis.profile.name
+    nearest = max(tried, key=lambda one: (one.coverage.schema.name == told, one.coverage.found), default=None)
     own = f"a profile of its own: 'care profiles new {log.path.name}' writes a first one"
     if nearest is None or not nearest.coverage.found:
         return [own]

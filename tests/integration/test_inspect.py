@@ -8,6 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import care_core
+from care_core.application.case import Request
+from care_core.application.viewing import what_would_fit
+from care_core.files import bundled
 from tests.conftest import Care
 from tests.ros_samples import write_db3
 
@@ -86,3 +90,13 @@ def test_an_encoding_of_escapes_reaches_no_terminal(care: Care, tmp_path: Path) 
     (path.parent / "metadata.yaml").unlink(missing_ok=True)
     for flags in ((), ("--json",)):
         assert "\x1b" not in care("inspect", path, *flags).stdout
+
+
+def test_what_would_make_a_profile_fit_is_told_of_the_profile_that_is_said_not_to() -> None:
+    """Another may have more of the log."""
+    case = care_core.triage(Request(bundled("samples", "nav2_mppi_failed.mcap"), "nav2"))
+    assert case.diagnosis.profile.fit.verdict == "no"
+    *told, own = what_would_fit(case)
+    assert told
+    assert all(one.startswith("for nav2: ") for one in told)
+    assert own.startswith("a profile of its own")
