@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 
 from textual.app import App, SystemCommand
 from textual.binding import ActiveBinding, Binding, BindingType
+from textual.command import CommandPalette
 from textual.driver import Driver
 from textual.events import CursorPosition, Paste, Resize
 from textual.reactive import Reactive
@@ -239,8 +240,14 @@ class CareApp(App[int], inherit_bindings=False):
 
     def get_key_display(self, binding: Binding) -> str:
         """How a key is written; by its name where arrows and the like cannot be drawn."""
-        is_named = self.workspace.glyphs is ASCII or binding.key == "enter"
-        return (binding.key_display or binding.key) if is_named else super().get_key_display(binding)
+        shown = super().get_key_display(binding)
+        is_named = binding.key == "enter" or (self.workspace.glyphs is ASCII and not shown.isascii())
+        return (binding.key_display or binding.key) if is_named else shown
+
+    def action_command_palette(self) -> None:
+        """Show the command palette."""
+        if not CommandPalette.is_open(self):
+            self.push_screen(CommandPalette(placeholder="Search for commands...", id="--command-palette"))
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
         """What the command palette offers, each with its keys: the pages by the names of their tabs, and what the page
@@ -255,8 +262,8 @@ class CareApp(App[int], inherit_bindings=False):
                 if id in keys and id != OPEN:
                     binding = active.binding
                     action = binding.action.partition("(")[0]
-                    about = (getattr(screen.page, f"action_{action}").__doc__ or "").strip().rstrip(".")
-                    about = f"{about} ({keys[id]})"
+                    doc = binding.tooltip or getattr(screen.page, f"action_{action}").__doc__ or ""
+                    about = f"{doc.strip().rstrip('.')} ({keys[id]})"
                     yield SystemCommand(label_of(active), about, partial(screen.page.run_action, binding.action))
         yield SystemCommand("Help", "The keys that work here", self.action_help)
         yield SystemCommand("Theme", "Change the colours", self.action_change_theme)

@@ -54,8 +54,22 @@ class PlotsPage(Page):
     FITS = True
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Messages"),
-        Binding("plus,right_square_bracket", "zoom(0.5)", "Closer", key_display="+", id="signals.closer"),
-        Binding("minus,left_square_bracket", "zoom(2.0)", "Farther", key_display="-", id="signals.farther"),
+        Binding(
+            "plus,right_square_bracket",
+            "zoom(0.5)",
+            "Closer",
+            key_display="+",
+            id="signals.closer",
+            tooltip="Draw half of the time around the moment",
+        ),
+        Binding(
+            "minus,left_square_bracket",
+            "zoom(2.0)",
+            "Farther",
+            key_display="-",
+            id="signals.farther",
+            tooltip="Draw twice the time around the moment, at most the whole log",
+        ),
         Binding("n", "next_marked", "Next mark", id="signals.next"),
         Binding("x", "keep", "Keep beside", id="signals.beside"),
     ]

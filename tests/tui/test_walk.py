@@ -755,6 +755,8 @@ async def test_the_palette_offers_steps_and_actions(make_app: MakeApp) -> None:
     about = dict(offered)
     assert {"Log", "Report", "Map", "Messages", "Alternative", "Undo", "Value", "Theme", "Help", "Quit"} <= about.keys()
     assert len(offered) == len(about)
+    told = [help.rpartition(" (")[0] for _, help in offered if help.endswith(")")]
+    assert sorted(told) == sorted(set(told)), "no two of them are told alike"
     assert about["Report"].endswith("(6)")
     assert about["Alternative"].endswith("(a)")
 
@@ -769,6 +771,12 @@ async def test_without_colours_and_in_ascii_nothing_is_lost(make_app: MakeApp, m
             assert screen.isascii(), [c for c in screen if not c.isascii()]
         await settle(pilot, "2")
         assert "x FAULT" in items(app)
+        await settle(pilot, "4", "ctrl+p")
+        assert "Search for commands..." in shown(app)
+        assert shown(app).isascii(), [c for c in shown(app) if not c.isascii()]
+        await settle(pilot, "escape")
+        told = [command.help for command in app.get_system_commands(app.screen)]
+        assert any(one.endswith(" (+ ])") for one in told)
 
 
 async def test_a_page_that_is_just_being_prepared_is_turned_to_once_it_has_its_parts(make_app: MakeApp) -> None:
