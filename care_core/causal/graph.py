@@ -149,15 +149,6 @@ class CausalGraph(Record, dict=True):
         return frozenset(seen)
 
 
-def is_acyclic(nodes: Collection[str], directed: Iterable[Edge]) -> bool:
-    """Whether the directed edges close no cycle."""
-    try:
-        CausalGraph(tuple(nodes), frozenset(directed))
-    except ValueError:
-        return False
-    return True
-
-
 def _heads(nodes: tuple[str, ...], edges: Iterable[Edge]) -> dict[str, tuple[str, ...]]:
     """For each node the other ends of the edges that start at it, in the order of `nodes`."""
     rank = {node: i for i, node in enumerate(nodes)}

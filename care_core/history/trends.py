@@ -275,8 +275,3 @@ def _holm(ps: Sequence[float]) -> list[float]:
         largest = max(largest, min(ps[place] * (len(ps) - rank), 1.0))
         corrected[place] = largest
     return corrected
-
-
-def changes_on_the_way(runs: Sequence[Triaged]) -> list[tuple[Triaged, tuple[Changed, ...]]]:
-    """The runs at which something that somebody sets differs from the run before."""
-    return [(after, found) for before, after in pairwise(runs) if (found := changed(before, after))]

@@ -29,13 +29,10 @@ _MODULES = {"log": "account"}
 
 def make_page(name: str, workspace: Workspace, id: str) -> Page:
     """The page of that name, for the log that is open."""
-    module = import_module(f"care_tui.pages.{_MODULES.get(name, name)}")
-    page: Page = getattr(module, _CLASSES[name])(workspace, id=id)
-    return page
+    return page_class(name)(workspace, id=id)
 
 
-def page_classes() -> list[type[Page]]:
-    """Every kind of page."""
-    return [
-        getattr(import_module(f"care_tui.pages.{_MODULES.get(name, name)}"), kind) for name, kind in _CLASSES.items()
-    ]
+def page_class(name: str) -> type[Page]:
+    """The class of that page."""
+    found: type[Page] = getattr(import_module(f"care_tui.pages.{_MODULES.get(name, name)}"), _CLASSES[name])
+    return found

@@ -12,8 +12,8 @@ from textual.pilot import Pilot
 from textual.screen import ModalScreen
 
 from care_tui.app import CareApp
-from care_tui.page_names import NAMES
-from care_tui.pages.making import page_classes
+from care_tui.page_names import NAMES, PAGES
+from care_tui.pages.making import page_class
 from care_tui.screens.case import CaseScreen
 from care_tui.settings import Settings
 from care_tui.widgets.choices import Choices
@@ -42,7 +42,7 @@ def strangers(page: int) -> list[BindingType]:
 
 
 HERE = (CareApp.BINDINGS, CaseScreen.BINDINGS)
-DOES = [binding for page in page_classes() for binding in page.BINDINGS]
+DOES = [binding for page in map(page_class, PAGES) for binding in page.BINDINGS]
 """What the keys of single pages do; on every other page they have to do nothing."""
 
 

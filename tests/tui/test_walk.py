@@ -20,8 +20,8 @@ from care_core.errors import CareError, ExitCode
 from care_core.records import replace
 from care_core.variables import Variable
 from care_tui.app import CareApp
-from care_tui.page_names import NAMES
-from care_tui.pages.making import page_classes
+from care_tui.page_names import NAMES, PAGES
+from care_tui.pages.making import page_class
 from care_tui.render.causes import statistics_rows
 from care_tui.render.fix import OptionColumns, option_change, option_item
 from care_tui.render.rows import UNICODE
@@ -720,7 +720,7 @@ def test_every_binding_has_an_id_and_leaves_reserved_keys_alone() -> None:
         OpenLogDialog,
         Confirm,
     )
-    for owner in (*owners, *page_classes()):
+    for owner in (*owners, *map(page_class, PAGES)):
         for binding in owner.BINDINGS:
             assert not isinstance(binding, tuple)
             assert binding.id

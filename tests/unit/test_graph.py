@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.causal.graph import CausalGraph, is_acyclic
+from care_core.causal.graph import CausalGraph
 
 NODES = tuple("abcdefg")
 
@@ -47,11 +47,6 @@ def test_unsound_graphs_are_refused(
 def test_an_unknown_node_has_no_parents() -> None:
     with pytest.raises(ValueError, match="unknown node 'x'"):
         CausalGraph(("a",)).parents("x")
-
-
-def test_is_acyclic() -> None:
-    assert is_acyclic("ab", [("a", "b")])
-    assert not is_acyclic("abc", [("a", "b"), ("b", "c"), ("c", "a")])
 
 
 @given(graphs())
