@@ -246,7 +246,7 @@ class CareApp(App[int], inherit_bindings=False):
 
     def action_command_palette(self) -> None:
         """Show the command palette."""
-        if not CommandPalette.is_open(self):
+        if not isinstance(self.screen, CommandPalette):
             self.push_screen(CommandPalette(placeholder="Search for commands...", id="--command-palette"))
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:

@@ -371,7 +371,8 @@ def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding
     others = [one for one in others if not (one.startswith(_CAME_DOWN) and one.rpartition(" at ")[2] in told)]
     clauses = list(dict.fromkeys((first, *found, *others)))
     kept = _in_lines(clauses, LINES * LINE - len(f"{STATUS_WORDS['fault']}: ") - LINE // 8)
-    begun_s = min((one.onset_s for one in worst if _with_time(one) in kept), default=-math.inf)
+    onsets = [one.onset_s for one in worst if one.onset_s is not None and _with_time(one) in kept]
+    begun_s = min(onsets, default=-math.inf)
     early = [one for one in others if one in kept and _time_told(one) < begun_s]
     return "; ".join(dict.fromkeys((first, *early, *kept)))
 
