@@ -80,6 +80,12 @@ def listed(names: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(names[:-1]), *names[-1:]]) if len(names) > 1 else "".join(names)
 
 
+def first_of(names: Sequence[str], most: int) -> str:
+    """The names, of more than so many the first, with how many there are beside."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
+
+
 def figures(value: float, digits: int = 3) -> str:
     """A measured number with as many digits as it is worth, a large one without a power of ten: 0.0123, 71800."""
     return f"{float(f'{value:.{digits}g}'):.15g}"

@@ -14,7 +14,7 @@ from care_core.ecosystems.vehicles import is_self_written
 from care_core.logs.base import Table
 from care_core.numbers import Floats, ascending, distinct, median, pauses
 from care_core.run import Damage, Setting, shown
-from care_core.text import but_for_numbers, times_until
+from care_core.text import but_for_numbers, first_of, times_until
 
 Span = tuple[float, float]
 
@@ -79,9 +79,8 @@ def parameter_changes(
                 ground[name] = (ground.get(name, (t,))[0], f"{name} {change}")
     if ground:
         named = sorted(ground.values())
-        more = f" and {len(named) - _CHANGES_NAMED} more" if len(named) > _CHANGES_NAMED else ""
         what = "parameter changed" if len(named) == 1 else f"{len(named)} parameters changed"
-        text = f"{what} while disarmed: {', '.join(change for _, change in named[:_CHANGES_NAMED])}{more}"
+        text = f"{what} while disarmed: {first_of([change for _, change in named], _CHANGES_NAMED)}"
         yield Event(named[0][0], "parameter", text, source)
 
 

@@ -13,6 +13,7 @@ from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.run import MissionInfo, Run, Unavailable
+from care_core.text import first_of
 from care_core.variables import Role, Variable
 
 
@@ -64,11 +65,7 @@ def to_have(missed: Sequence[Missed]) -> list[str]:
         if one.hint:
             gives.setdefault(one.hint, []).append(one.variable.name)
     ranked = sorted(gives.items(), key=lambda item: -len(item[1]))
-    return [f"{hint} (gives {_named(names)})" for hint, names in ranked]
-
-
-def _named(names: Sequence[str]) -> str:
-    return ", ".join(names[:2]) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
+    return [f"{hint} (gives {first_of(names, 2)})" for hint, names in ranked]
 
 
 def cover(log: Log, schema: Schema) -> Coverage:

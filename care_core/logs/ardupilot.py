@@ -132,3 +132,12 @@ def wall_clock(tables: Mapping[str, Table]) -> str | None:
         return None
     fix = _GPS_EPOCH + timedelta(weeks=float(known[names[0]][0]), milliseconds=float(known[names[1]][0]))
     return (fix - timedelta(seconds=float(known.t[0]))).isoformat(timespec="seconds")
+
+
+def text_of(raw: bytes) -> str:
+    """Text up to the first zero byte; bytes that are not UTF-8 are read as Latin-1, so nothing is lost."""
+    raw = raw.split(b"\0", 1)[0]
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")

@@ -20,7 +20,16 @@ from numpy.typing import NDArray
 from care_core import limits
 from care_core.errors import LogError
 from care_core.logs import formats
-from care_core.logs.ardupilot import FACTS, GPS_TIME, PARM_FIELDS, dataflash_facts, parameters_of, shortest, wall_clock
+from care_core.logs.ardupilot import (
+    FACTS,
+    GPS_TIME,
+    PARM_FIELDS,
+    dataflash_facts,
+    parameters_of,
+    shortest,
+    text_of,
+    wall_clock,
+)
 from care_core.logs.base import Channel, Kind, LazyColumns, Table, Wanted
 from care_core.logs.clock import Clock, clock_of
 from care_core.logs.damage import summarised
@@ -489,7 +498,7 @@ def _read_formats(data: FileArray, starts: Offsets, types: Bytes) -> tuple[list[
     found, redefined = [own], []
     for byte in places.tolist():
         body = data.between(byte + 3, byte + _FMT_LENGTH).tobytes()
-        name, code, columns = (_text(part) for part in (body[2:6], body[6:22], body[22:86]))
+        name, code, columns = (text_of(part) for part in (body[2:6], body[6:22], body[22:86]))
         if not name.isidentifier() or body[1] < 3 or not set(code) <= _FIELD_TYPES.keys():
             continue
         form = _to_format(body[0], name, body[1], code, columns, byte)
@@ -608,7 +617,7 @@ def _decode(data: FileArray, offsets: Offsets, field: RecordField) -> NDArray[An
 def _decoded(values: NDArray[Any], field: RecordField) -> NDArray[Any]:
     """What is stored as float64, or as objects for text and arrays."""
     if field.dtype.kind == "S":
-        return np.array([_text(value) for value in values.tolist()], dtype=object)
+        return np.array([text_of(value) for value in values.tolist()], dtype=object)
     if field.dtype.shape:
         rows = np.empty(len(values), dtype=object)
         rows[:] = [tuple(row) for row in values.tolist()]
@@ -637,12 +646,3 @@ def _alike(forms: Iterable[Format]) -> list[tuple[Format, NDArray[np.bool_]]]:
         key = (form.fields[name], ticks)
         found.setdefault(key, (form, np.zeros(_MAX_TYPES, dtype=bool)))[1][form.type] = True
     return list(found.values())
-
-
-def _text(raw: bytes) -> str:
-    """Text up to the first zero byte; bytes that are not UTF-8 are read as Latin-1, so nothing is lost."""
-    raw = raw.split(b"\0", 1)[0]
-    try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.logs.ardupilot import text_of
 from care_core.logs.file_windows import Bytes, FileArray
 from care_core.records import Record
 
@@ -263,7 +264,7 @@ def decode(data: FileArray, start: Offsets, field: PacketField) -> NDArray[Any]:
     raw = data.at(first + field.offset, (np.uint8, field.dtype.itemsize))
     raw[within >= size[:, None]] = 0
     if field.dtype.kind == "S":
-        return _objects([_text(row.tobytes()) for row in raw])
+        return _objects([text_of(row.tobytes()) for row in raw])
     if field.dtype.shape:
         return _objects([tuple(row) for row in raw.view(field.dtype.base).tolist()])
     with np.errstate(invalid="ignore"):
@@ -274,11 +275,3 @@ def _objects(values: Sequence[Any]) -> NDArray[Any]:
     column = np.empty(len(values), dtype=object)
     column[:] = values
     return column
-
-
-def _text(raw: bytes) -> str:
-    raw = raw.split(b"\0", 1)[0]
-    try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")

@@ -24,7 +24,7 @@ from care_core.report.document import estimate, parameter_names, plain_number
 from care_core.report.published import Document, publish
 from care_core.run import FitVerdict
 from care_core.tables import parquet
-from care_core.text import clean, listed, percent, wrapped
+from care_core.text import clean, first_of, listed, percent, wrapped
 
 SCHEMA_ID: Final = "care.fleet/1"
 NAMED = 8
@@ -342,9 +342,7 @@ def _headline(one: Pattern, short: Mapping[str, str]) -> str:
 
 
 def _names(names: Sequence[str], short: Mapping[str, str]) -> str:
-    return ", ".join(_on_one_line(short.get(name, run_name(name))) for name in names[:NAMED]) + (
-        f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    )
+    return first_of([_on_one_line(short.get(name, run_name(name))) for name in names], NAMED)
 
 
 def _details(one: Pattern) -> Iterator[str]:

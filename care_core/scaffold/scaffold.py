@@ -18,7 +18,8 @@ from care_core.scaffold.mentioned import mentioned_parameters
 from care_core.scaffold.missions import Missions, find_missions
 from care_core.scaffold.options import Options, find_options
 from care_core.scaffold.thresholds import ProposedThreshold, good_runs, proposed_thresholds
-from care_core.scaffold.writing import comment, listed, scalar, variable_lines
+from care_core.scaffold.writing import comment, scalar, variable_lines
+from care_core.text import first_of
 from care_core.variables import Role, Variable
 
 _ONLY_SAID = "only said in /rosout (record parameter_updates or /parameter_events, or give their file with --config)"
@@ -159,6 +160,8 @@ def _mission(missions: Missions) -> Iterator[str]:
     yield ""
 
 
+_NAMED = 60
+"""Names in a comment of a profile; of more the first."""
 _TITLES = {
     Role.CONTEXT: "Contexts: what was asked and met, never suggested.",
     Role.METRIC: "Metrics: what options move before they move an objective.",
@@ -208,12 +211,12 @@ def _left_out(options: Options, measures: Measures) -> Iterator[str]:
     yield ""
     yield "# Left out, and why."
     for reason, names in options.left.items():
-        yield from comment(f"{_count(len(names), 'parameter')}, {reason}: {listed(names)}")
+        yield from comment(f"{_count(len(names), 'parameter')}, {reason}: {first_of(names, _NAMED)}")
     reasons: dict[str, list[str]] = {}
     for name, why in measures.left.items():
         reasons.setdefault(why, []).append(name)
     for why, names in reasons.items():
-        yield from comment(f"measures without a value, {why}: {listed(names)}")
+        yield from comment(f"measures without a value, {why}: {first_of(names, _NAMED)}")
     for path, why in measures.without.items():
         yield from comment(f"{Path(path).name}: {why}")
 

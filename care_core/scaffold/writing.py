@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from care_core.text import clean
@@ -35,12 +35,6 @@ def comment(text: str, indent: int = 0) -> list[str]:
     """The text as comment lines of at most `WIDTH` columns."""
     head = f"{' ' * indent}# "
     return textwrap.wrap(clean(text), WIDTH, initial_indent=head, subsequent_indent=head, break_on_hyphens=False)
-
-
-def listed(names: Sequence[str], most: int = 60) -> str:
-    """Names in a sentence; of very many the first."""
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
 def variable_lines(variable: Variable, remark: str = "") -> Iterator[str]:

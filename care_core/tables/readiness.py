@@ -15,12 +15,15 @@ from care_core.files import read_small_text
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.tables.parquet import SUFFIX, read_parquet
+from care_core.text import first_of
 from care_core.variables import Role, Variable
 
 MIN_RUNS = 30
 """Below this, Fisher's z at the default alpha sees only correlations above 0.5."""
 ADVISED_RUNS = 100
 """From so many on the first cause named is mostly the true one: `python -m benchmarks.few_runs`."""
+_NAMED = 12
+"""Names in a line; of more the first."""
 RUNS_FILE = "runs.csv"
 """The table of the logs that a profile was written from, beside its `profile.yaml`."""
 
@@ -52,7 +55,7 @@ def _obstacles(schema: Schema, columns: Columns, runs: int) -> Iterator[str]:
         yield "no option varies: nothing can be learned about any"
     gone = [option.name for option in schema.options if any(value is None for value in columns.get(option.name, ()))]
     if gone:
-        yield f"options without a value in some run ({len(gone)}): {_names(gone)}"
+        yield f"options without a value in some run ({len(gone)}): {first_of(gone, _NAMED)}"
     if not schema.objectives:
         yield "no objective is declared: nothing tells a good mission from a bad one"
     elif not any(_varies(columns, objective) for objective in schema.objectives):
@@ -62,12 +65,12 @@ def _obstacles(schema: Schema, columns: Columns, runs: int) -> Iterator[str]:
 def _gaps(schema: Schema, columns: Columns, runs: int) -> Iterator[str]:
     still = [option.name for option in schema.options if not _varies(columns, option)]
     if still and len(still) < len(schema.options):
-        yield f"options that never vary, of which nothing can be learned ({len(still)}): {_names(still)}"
+        yield f"options that never vary, of which nothing can be learned ({len(still)}): {first_of(still, _NAMED)}"
     for role in (Role.OBJECTIVE, Role.METRIC, Role.CONTEXT):
         empty = [v.name for v in schema.of(role) if not _known(columns, v)]
         if empty and runs:
             plural = "s" if len(empty) > 1 else ""
-            yield f"{role.value}{plural} without a value in any run ({len(empty)}): {_names(empty)}"
+            yield f"{role.value}{plural} without a value in any run ({len(empty)}): {first_of(empty, _NAMED)}"
     for objective in schema.objectives:
         bound = objective.fixed
         met = {bound.met(value) for value in _known(columns, objective)} if bound is not None else set()
@@ -81,11 +84,6 @@ def _known(columns: Columns, variable: Variable) -> list[float]:
 
 def _varies(columns: Columns, variable: Variable) -> bool:
     return len(set(_known(columns, variable))) > 1
-
-
-def _names(names: Sequence[str], most: int = 12) -> str:
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
 def read_columns(path: Path, schema: Schema) -> tuple[dict[str, list[float | None]], int]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -39,7 +39,7 @@ from care_core.ecosystems.ros.recoveries import announced, repairs
 from care_core.ecosystems.timeline import counted
 from care_core.logs.ros_message import short_name
 from care_core.numbers import Floats
-from care_core.text import log_time, shortened
+from care_core.text import first_of, log_time, shortened
 
 _GOALS, _MESSAGES, _REPORTS, _CHANGES, _CONTACTS = 12, 14, 6, 5, 6
 """Lines of each sort at most."""
@@ -49,6 +49,8 @@ STOOD_M = 0.5
 """A robot that comes no farther has not moved enough for a localisation to say so: amcl's update_min_d is 0.25 m."""
 SLOWER, SLOWER_S = 0.5, 10.0
 """A stream whose rate falls below this share of what it was, for so long, is told of."""
+_NAMED = 6
+"""Topics or nodes that one moment names."""
 _TEXT = 110
 _URGENT = {2: 0, 3: 1, 1: 2}
 """An error of diagnostics comes before silence, and that before a warning."""
@@ -85,7 +87,7 @@ def _recorded(drive: Drive) -> Iterator[Event]:
     yield Event(0.0, "recording", f"the recording begins: {words}", "recording")
     empty = [one.name for one in drive.channels if not one.count and short_name(one.type) not in WITHOUT_STREAM]
     if empty:
-        yield Event(0.0, "topic", f"no message on {_listed(empty)}", "recording")
+        yield Event(0.0, "topic", f"no message on {first_of(empty, _NAMED)}", "recording")
 
 
 def _damage(drive: Drive) -> Iterator[Event]:
@@ -179,7 +181,8 @@ def _pauses(drive: Drive) -> Iterator[Event]:
     for names in paused.values():
         first = drive.times[names[0]]
         row = int(np.argmax(np.diff(first)))
-        words = f"{_listed(names)} {'pause' if len(names) > 1 else 'pauses'} for {first[row + 1] - first[row]:.1f} s"
+        pause = "pause" if len(names) > 1 else "pauses"
+        words = f"{first_of(names, _NAMED)} {pause} for {first[row + 1] - first[row]:.1f} s"
         yield Event(float(first[row]), "topic", words, names[0])
 
 
@@ -211,9 +214,9 @@ def _contacts(drive: Drive) -> Iterator[Event]:
     """What touched the robot, by the topics that tell of it."""
     times = drive.contacts_s.tolist()
     if times:
-        when = _listed((log_time(at) for at in times), _CONTACTS)
+        when = first_of([log_time(at) for at in times], _CONTACTS)
         topics = (*drive.contact_topics, *(drive.bumper_topics if drive.bumps else ()))
-        words = f"{counted(len(times), 'contact')} told by {_listed(topics)}: {when}"
+        words = f"{counted(len(times), 'contact')} told by {first_of(topics, _NAMED)}: {when}"
         yield Event(times[0], "contact", words, topics[0])
 
 
@@ -228,7 +231,7 @@ def _lifecycle(drive: Drive) -> Iterator[Event]:
         if state in ("active", "inactive", "finalized", "unconfigured", "errorprocessing"):
             nodes = list(dict.fromkeys(node for _, node in own))
             kind = "error" if state == "errorprocessing" else "lifecycle"
-            yield Event(min(t for t, _ in own), kind, f"{_listed(nodes)}: {state}", "transition_event")
+            yield Event(min(t for t, _ in own), kind, f"{first_of(nodes, _NAMED)}: {state}", "transition_event")
 
 
 def _changes(drive: Drive) -> Iterator[Event]:
@@ -278,11 +281,6 @@ def _driven(odometry: Odometry) -> str:
 
 def _times(count: int, last_s: float) -> str:
     return f" ({count} times, until {log_time(last_s)})" if count > 1 else ""
-
-
-def _listed(names: Iterable[str], most: int = 6) -> str:
-    every: Sequence[str] = list(names)
-    return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
 def _cut(text: str) -> str:

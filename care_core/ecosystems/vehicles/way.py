@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
 from care_core.numbers import Floats, distinct, median
 from care_core.records import Record
+from care_core.run import Unavailable, Value
 
 METRES_PER_DEGREE = 111_319.49
 AIRBORNE_M = 2.0
@@ -173,6 +174,23 @@ def phases_home(
         phases["descent"] = Phase(leave_s, slow_s)
     phases["touchdown"] = Phase(slow_s, end_s)
     return phases
+
+
+def number_asked(asked: RequestedMission | Unavailable, what: str) -> Value:
+    """One of the `NUMBERS` of a mission."""
+    measure = NUMBERS.get(what)
+    if measure is None:
+        return Unavailable(f"there is no '{what}' of a mission", f"use one of {', '.join(NUMBERS)}")
+    return asked if isinstance(asked, Unavailable) else measure(asked)
+
+
+def span_in(phases: Mapping[tuple[str, int], Phase], args: Mapping[str, Any]) -> tuple[float, float] | Unavailable:
+    """Start and end in the log of the part of the flight that the arguments of an extractor name."""
+    name, index = str(args.get("phase", "")), int(args.get("index", 0))
+    phase = phases.get((name, index))
+    if phase is None:
+        return Unavailable(f"the flight did not complete '{name}{f' {index}' if index else ''}'")
+    return phase.start_s, phase.end_s
 
 
 def distance_to_legs(points: Floats, corners: Floats) -> Floats:

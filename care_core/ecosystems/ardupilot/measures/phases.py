@@ -6,6 +6,7 @@ from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import FlownMission, analyse
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.measures import Args, Mission, numeric, one_of
+from care_core.ecosystems.vehicles.way import span_in
 from care_core.run import Unavailable
 
 PHASE_ARGS = {
@@ -26,10 +27,4 @@ def flown_mission(mission: Mission) -> FlownMission | Unavailable:
 def span_of_phase(mission: Mission, args: Args) -> tuple[float, float] | Unavailable:
     """Start and end in the log of the part of the flight that `args` name."""
     flown = flown_mission(mission)
-    if isinstance(flown, Unavailable):
-        return flown
-    name, index = str(args.get("phase", "")), int(args.get("index", 0))
-    phase = flown.phases.get((name, index))
-    if phase is None:
-        return Unavailable(f"the flight did not complete '{name}{f' {index}' if index else ''}'")
-    return phase.start_s, phase.end_s
+    return flown if isinstance(flown, Unavailable) else span_in(flown.phases, args)

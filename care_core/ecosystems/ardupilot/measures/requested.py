@@ -33,7 +33,7 @@ from care_core.ecosystems.ardupilot.measures.samples import samples, whole
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.coverage import USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
-from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, offset_m
+from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, number_asked, offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
 from care_core.run import Unavailable, Value
@@ -225,11 +225,7 @@ def mission_asked(mission: Mission, args: Args) -> Value:
     """One number of the mission that the vehicle was given: lengths and heights in m, times in s, turns in degrees,
     `commanded_speed` in m/s (0: none), `returns` 1 or 0; corners are `sharp` from 60 degrees, `sharp_turns` adds up
     theirs, those with a wait too."""
-    measure = NUMBERS.get(str(args.get("what")))
-    if measure is None:
-        return Unavailable(f"there is no '{args.get('what')}' of a mission", f"use one of {', '.join(NUMBERS)}")
-    found = mission.shared(requested_mission)
-    return found if isinstance(found, Unavailable) else measure(found)
+    return number_asked(mission.shared(requested_mission), str(args.get("what")))
 
 
 # --- the vehicle ------------------------------------------------------------------------------------------------

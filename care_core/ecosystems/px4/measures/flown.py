@@ -25,7 +25,7 @@ from care_core.ecosystems.px4.measures.requested import (
     requested_mission,
 )
 from care_core.ecosystems.vehicles import way_of
-from care_core.ecosystems.vehicles.way import AIRBORNE_M, Phase, Track, distance_to_legs, phases_home
+from care_core.ecosystems.vehicles.way import AIRBORNE_M, Phase, Track, distance_to_legs, phases_home, span_in
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import Floats
 from care_core.records import Record
@@ -112,13 +112,7 @@ def flown_mission(mission: Mission) -> FlownMission | Unavailable:
 def span_of_phase(mission: Mission, args: Mapping[str, object]) -> tuple[float, float] | Unavailable:
     """Start and end in the log of the part of the flight that `args` name."""
     flown = flown_mission(mission)
-    if isinstance(flown, Unavailable):
-        return flown
-    name, index = str(args.get("phase", "")), int(str(args.get("index", 0)))
-    phase = flown.phases.get((name, index))
-    if phase is None:
-        return Unavailable(f"the flight did not complete '{name}{f' {index}' if index else ''}'")
-    return phase.start_s, phase.end_s
+    return flown if isinstance(flown, Unavailable) else span_in(flown.phases, args)
 
 
 def analyse(mission: Mission) -> FlownMission:

@@ -14,7 +14,7 @@ import numpy as np
 
 from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
 from care_core.ecosystems.px4.flight import RESULT, RESULT_FIELDS
-from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, offset_m
+from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, number_asked, offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record
 from care_core.run import Unavailable, Value
@@ -201,8 +201,4 @@ def items_in_all(mission: Mission) -> int | None:
 def mission_asked(mission: Mission, args: Args) -> Value:
     """One number of the mission, as far as it was begun: lengths and heights in m, times in s, turns in degrees,
     `commanded_speed` in m/s (0: none), `returns` 1 or 0."""
-    measure = NUMBERS.get(str(args.get("what")))
-    if measure is None:
-        return Unavailable(f"there is no '{args.get('what')}' of a mission", f"use one of {', '.join(NUMBERS)}")
-    found = mission.shared(requested_mission)
-    return found if isinstance(found, Unavailable) else measure(found)
+    return number_asked(mission.shared(requested_mission), str(args.get("what")))
