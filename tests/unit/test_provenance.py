@@ -89,7 +89,7 @@ def test_an_option_that_changed_on_the_mission_is_told(move_base: Schema) -> Non
     )
     driven = {parameter: history[1]}
     assert notes(move_base, (), driven, changes={parameter: history, "/other": history}) == (
-        "occdist_scale was changed during the mission from 0.01 to 0.02 at 75.0 s, to 0.05 at 133.9 s (2:13);"
+        "occdist_scale was changed during the mission from 0.01 to 0.02 at 75.0 s, to 0.05 at 133.9 s (2:14);"
         " judged is 0.02, as in most of the mission",
     )
 
