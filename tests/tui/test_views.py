@@ -244,7 +244,7 @@ async def test_the_path_of_a_cause_is_in_view_however_low_the_terminal(size: tup
     app = real()
     async with app.run_test(size=size) as pilot:
         await settle(pilot, "3")
-        for line in ("LAND_SPEED    16 cm/s", "landing_time  66.13 s", "mission_time  164.7 s", "limit <= 145.6 s"):
+        for line in ("LAND_SPEED    16 cm/s", "landing_time  66.13 s", "mission_time  164.7 s", "limit <= 145.1 s"):
             assert line in shown(app)
 
 

@@ -80,7 +80,7 @@ def test_the_reference_is_the_default_or_the_middle_of_the_training_runs(planted
     assert profile_config(bare, planted.model)["speed"] == OPTIONS[0].snap(quantiles[10])
 
 
-@pytest.mark.parametrize(("value", "off"), [(5.0, False), (5.0 + 1e-9, False), (5.001, True), (-5.0, True)])
+@pytest.mark.parametrize(("value", "off"), [(5.0, False), (5.001, False), (5.01, True), (-5.0, True)])
 def test_a_deviation_is_more_than_rounding(value: float, off: bool) -> None:
     assert deviating({"speed": value}, {"speed": 5.0, "accel": 1.0}) == (("speed",) if off else ())
 
