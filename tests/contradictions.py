@@ -200,6 +200,15 @@ def _(report: Report) -> bool:
     return any(one is not None and abs(one - _odds(report)) > _ROUNDED for one in alone) and _odds(report) > 0.0
 
 
+@_named("another change, as large, that promises more")
+def _(report: Report) -> bool:
+    if report.fix is None or report.fix.odds is None:
+        return False
+    others = [one.p_fixed for one in report.fix.alternatives if len(one.changes) <= len(report.fix.changes)]
+    alone = [one.p_fixed for fault in report.faults for one in fault.causes if not _is_lead(one)]
+    return any(one is not None and one > _odds(report) + _ROUNDED for one in (*others, *alone))
+
+
 @_named("a refusal that gives its change other odds than the line of that cause")
 def _(report: Report) -> bool:
     told = _REFUSED_CHANGE.search(report.abstained or "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.causes import MIN_CONTRIBUTION
 from care_core.diagnose.circumstances import battery_is_low
 from care_core.diagnose.estimates import NECESSARY, WORTH
@@ -275,12 +276,12 @@ def _resets(failed: FailedRun, faults: tuple[Fault, ...]) -> list[Fix]:
 def _shown_by_run(failed: FailedRun, hypotheses: Sequence[Hypothesis]) -> Fix | None:
     """The parameters that a finding of this run names, back at their reference: what it shows is worth a change where
     training says little of it, though nothing says what that promises. None where none stands above chance; of a
-    warning they have to be likelier than all else."""
+    warning they have to be likelier than all else, and the limits such as the reference meets."""
     query, (title, named) = failed.query, _named_by_run(failed, "critical")
     if not named:
         title, named = _named_by_run(failed, "warning")
         acts = {one.name for one in hypotheses if one.what == "parameter" and one.probability > MOST_LIKELY}
-        named = named if acts & set(named) else ()
+        named = named if acts & set(named) and _reference_meets(query) else ()
     if not named or failed.profile.schema.learned_elsewhere:
         return None
     chance = sum(one.probability for one in hypotheses if one.what == "chance")
@@ -290,6 +291,12 @@ def _shown_by_run(failed: FailedRun, hypotheses: Sequence[Hypothesis]) -> Fix | 
         return None
     fix = to_fix(query, back, float(query.probability([{**query.config, **back}])[0]))
     return replace(fix, predicted={}, shown_by=title)
+
+
+def _reference_meets(query: CounterfactualQuery) -> bool:
+    """Whether the reference configuration mostly meets every limit: one out of reach no change meets."""
+    before = replace(query, observed={}, repeats=())
+    return float(before.probability([query.reference])[0]) > MOST_LIKELY
 
 
 def _named_by_run(failed: FailedRun, severity: Severity) -> tuple[str, Collection[str]]:
