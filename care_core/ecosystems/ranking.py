@@ -96,11 +96,16 @@ def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
         and not any(one.severity == "info" and one.suspect in ("parameter", "operation") for one in (root, finding))
         and finding.kind in reach.get(root.kind, frozenset())
         and _may_refuse(root, finding)
-        and not (root.title == UNCHARGED and finding.title.startswith(OWN_SUPPLY))  # 5 V, out of any pack's rest
+        and not (root.title == UNCHARGED and _needs_no_full_pack(finding))
         and root.onset_s <= finding.onset_s + SLACK_S
         and root.end_s >= finding.onset_s - OVER_S
         and (finding.probability < LIKELY or (root.probability >= LIKELY and not _only_set(root, finding)))
     )
+
+
+def _needs_no_full_pack(finding: Finding) -> bool:
+    """Whether a pack that was not charged is no reason of it: of one motor among several, or of a supply of 5 V."""
+    return finding.kind == "motor" or finding.title.startswith(OWN_SUPPLY)
 
 
 def _may_refuse(cause: Finding, finding: Finding) -> bool:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.ecosystems.explains import Explains
-from care_core.ecosystems.findings import Finding, FindingKind, Severity
+from care_core.ecosystems.findings import UNCHARGED, Finding, FindingKind, Severity
 from care_core.ecosystems.ranking import OVER_S, SLACK_S, lost_by, rank_findings
 from care_core.records import replace
 from care_core.report.health import finding_lines
@@ -128,3 +128,11 @@ def test_of_many_consequences_the_critical_ones_are_printed() -> None:
     crash = replace(finding("drive", 9.0), title="it crashed")
     lines = "\n".join(finding_lines([replace(finding("laser", 1.0), consequences=(*below, crash))]))
     assert "it crashed (9.0 s) and 2 more" in " ".join(lines.split())
+
+
+def test_a_pack_that_was_not_charged_weakens_no_single_motor() -> None:
+    empty = replace(finding("battery", 0.0, "warning"), title=UNCHARGED, end_s=80.0)
+    motor, weak = finding("motor", 18.0, "warning"), finding("thrust", 20.0, "warning")
+    roots = rank_findings([empty, motor, weak])
+    assert "motor" not in [one.kind for root in roots if root.kind == "battery" for one in root.below]
+    assert "motor" in [root.kind for root in roots]
