@@ -22,7 +22,8 @@ from care_core.run import shown
 READS: Wanted = merge_needs((straight.READS, {"RCOU": tuple(f"C{n}" for n in range(1, 15))}))
 LIMITS = Limits(straight.LIMITS)
 _OFF_US = LIMITS.add("trim off its default", 60.0, "us", "what banks a plane by 5 degrees")
-_HELD_US = LIMITS.add("trim off where the surface is held", 80.0, "us", "75 at most in 100 simulated planes")
+_HELD_US = LIMITS.add("trim off where the ailerons are held", 80.0, "us", "2 at most in 100 simulated planes")
+_TRIMS_US = LIMITS.add("trim off where the elevator is held", 150.0, "us", "twice the most of these")
 _AS_DEFAULT = LIMITS.add("share of it within which the default is meant", 0.5, "", "a choice: an elevator trims, too")
 _FAR = LIMITS.add("the same that loses a mission, as a share of the travel", 0.4, "", "a choice: a turn wants the rest")
 _BANK_DEG = LIMITS.add("bank of straight flight", 5.0, "deg", "twice what any simulated plane with a right trim has")
@@ -93,14 +94,15 @@ def _off(flight: Flight) -> Iterator[_Surface]:
 
 def _of_held(surface: _Surface) -> Finding | None:
     """Ailerons or an elevator that the autopilot holds off their trim."""
-    if surface.off_us < _HELD_US or not (surface.is_default_meant or surface.function == _AILERONS):
+    least = _HELD_US if surface.function == _AILERONS else _TRIMS_US
+    if surface.off_us < least or not (surface.is_default_meant or surface.function == _AILERONS):
         return None
     is_far = surface.off_us > _FAR * surface.travel
     wanted = surface.default if surface.is_default_meant else float(round(surface.held))
     what, whose = _HELD[surface.function]
     evidence = (
         f"in straight flight the output is held at {surface.held:.0f} us, and {_told(surface)}: off by "
-        f"{surface.off_us:.0f} us (limit {_HELD_US:g})"
+        f"{surface.off_us:.0f} us (limit {least:g})"
     )
     return _finding(surface, f"the trim of {what} is not {whose} middle", evidence, is_far, wanted, "")
 
