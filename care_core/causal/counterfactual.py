@@ -138,6 +138,10 @@ class CounterfactualQuery(Record, eq=False, dict=True):
             total *= np.min([p_ok[name] for name in group], axis=0)
         return total
 
+    def unobserved(self) -> CounterfactualQuery:
+        """The same for any run in such a mission, whatever this one met."""
+        return replace(self, observed={}, repeats=())
+
     def before(self) -> CounterfactualQuery:
         """The same before anything of this run is known but which stages of its mission it passed: what did not fail
         there has lost it there in no way."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.causes import MIN_CONTRIBUTION
@@ -21,7 +21,14 @@ from care_core.diagnose.fixes import (
 )
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.next_step import KEPT
-from care_core.diagnose.outside.change import Advisable, asked_by_refusals, check_first, outside_fix, refused_beside
+from care_core.diagnose.outside.change import (
+    ENOUGH,
+    Advisable,
+    asked_by_refusals,
+    check_first,
+    outside_fix,
+    refused_beside,
+)
 from care_core.diagnose.parts import mend_first, set_wrong, was_refused
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
@@ -29,7 +36,11 @@ from care_core.diagnose.records import Fault, Fix, Hypothesis
 from care_core.diagnose.tell_more import AllBack
 from care_core.diagnose.worth import falls_short, is_worth, nearest, no_stand_out, promised, unrecorded, untried
 from care_core.ecosystems.findings import Finding, Severity, every_finding
+from care_core.profile.schema import Schema
 from care_core.records import Record, replace
+from care_core.run import Evidence
+from care_core.text import percent
+from care_core.variables import Change
 
 BESIDE = 0.3
 """Share of the leading parameter's probability from which an option is changed with it."""
@@ -96,7 +107,7 @@ def _without(failed: FailedRun, promise: Promise, outside: Collection[str], opti
     config = {**query.config, **options}
     odds = promise.without(outside, config)
     if was_refused(failed.findings):
-        odds *= float(replace(query, observed={}, repeats=()).probability([config])[0])
+        odds *= float(query.unobserved().probability([config])[0])
     return odds
 
 
@@ -295,8 +306,7 @@ def _shown_by_run(failed: FailedRun, hypotheses: Sequence[Hypothesis]) -> Fix | 
 
 def _reference_meets(query: CounterfactualQuery) -> bool:
     """Whether the reference configuration mostly meets every limit: one out of reach no change meets."""
-    before = replace(query, observed={}, repeats=())
-    return float(before.probability([query.reference])[0]) > MOST_LIKELY
+    return float(query.unobserved().probability([query.reference])[0]) > MOST_LIKELY
 
 
 def _named_by_run(failed: FailedRun, severity: Severity) -> tuple[str, Collection[str]]:
@@ -325,6 +335,43 @@ def part_first(failed: FailedRun, findings: Sequence[Finding]) -> Finding | None
     part = mend_first(findings)
     is_full = battery_is_low(failed.run, failed.query.model, failed.profile.schema) is False
     return None if part is not None and part.kind == "prearm" and is_full else part
+
+
+def likelier_than(part: Finding, hypotheses: Sequence[Hypothesis], failed: FailedRun) -> str:
+    """What is changed once a part is mended, since it is likelier the cause than that; empty where nothing is."""
+    query, first = failed.query, next(iter(hypotheses), None)
+    if first is None or first.what != "parameter" or first.name not in failed.off - query.kept:
+        return ""
+    rival = sum(one.probability for one in hypotheses if one.name == part.title)
+    if first.probability < ENOUGH or first.probability <= rival:
+        return ""
+    option = query.variables[first.name]
+    values = (option.show(config[first.name]) for config in (query.config, query.reference))
+    return f"then put {first.name} back from {' to '.join(values)}, {percent(first.probability)} the cause"
+
+
+def shown_back(
+    judged: Judged,
+    schema: Schema,
+    explained: Sequence[Hypothesis],
+    said: Mapping[str, Evidence],
+    findings: Sequence[Finding],
+) -> Fix | None:
+    """The option that leads the explanations and that a critical finding speaks of, back at its reference, where no
+    objective could be judged and nothing has odds; None where there is none."""
+    first = next(iter(explained), None)
+    option = next((one for one in schema.options if first is not None and one.name == first.name), None)
+    if first is None or option is None or first.what != "parameter" or first.probability < ENOUGH:
+        return None
+    grave = {one.title for one in findings if one.severity == "critical"}
+    shown_by = next((title for title, one in said.items() if title in grave and option.name in one.options), None)
+    driven, reference = judged.run.config, judged.reference.config
+    back = reference.get(option.name)
+    if shown_by is None or back is None or option.safety or not option.accepts(back):
+        return None
+    if option.name not in deviating(driven, reference):
+        return None
+    return Fix((Change(option, driven[option.name], back),), first.probability, {}, shown_by=shown_by)
 
 
 def failsafes_held(failed: FailedRun, findings: Sequence[Finding]) -> frozenset[str]:

@@ -100,7 +100,7 @@ def settled(query: CounterfactualQuery, assignment: Assignment) -> tuple[Assignm
     training, is not known to a step.
     """
     chosen = dict(assignment)
-    before = replace(query, observed={}, repeats=())
+    before = query.unobserved()
     wary = replace(before, wary_from={**query.config, **chosen})
     floor = _floor(query, chosen)
     for name in assignment:

@@ -19,7 +19,7 @@ from care_core.configs.driven import same_value
 from care_core.diagnose.estimates import BY_CAUSES
 from care_core.diagnose.noisy_or import CHANCE, Key, NoisyOr
 from care_core.numbers import logistic, logit
-from care_core.records import Record, replace
+from care_core.records import Record
 
 SURE = 0.002
 """No promise is nearer than this to 0 or 1."""
@@ -59,7 +59,7 @@ class Promise(Record, eq=False):
         Args:
             changed: the configuration with all changes. given: with those that are made already.
         """
-        before = replace(self.query, observed={}, repeats=())
+        before = self.query.unobserved()
         shares = [0.0]
         for name in self.broken:
             if name in before.model.outcomes:

@@ -11,7 +11,6 @@ from care_core.diagnose.judging import Judged, unread_options
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Fix, ObjectiveResult
 from care_core.diagnose.worth import by_chance
-from care_core.records import replace
 
 
 def reference_of(judged: Judged) -> str:
@@ -65,7 +64,7 @@ def _promise(query: CounterfactualQuery, broken: Sequence[str]) -> str:
 
 def _odds(query: CounterfactualQuery) -> float:
     """Probability that the reference configuration meets every limit in a mission like this, whatever this run met."""
-    return float(replace(query, observed={}, repeats=()).probability([query.reference])[0])
+    return float(query.unobserved().probability([query.reference])[0])
 
 
 def _if_hidden(failed: FailedRun, fix: Fix, now: float) -> str:

@@ -8,9 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose import provenance
-from care_core.diagnose.advice import all_back, of_options, of_outside, part_first, with_refusals
+from care_core.diagnose.advice import (
+    all_back,
+    likelier_than,
+    of_options,
+    of_outside,
+    part_first,
+    shown_back,
+    with_refusals,
+)
 from care_core.diagnose.blame import blame
 from care_core.diagnose.causes import UNSURE, as_in_fix, as_ranked, causes_of
 from care_core.diagnose.circumstances import circumstances, unusual
@@ -19,7 +26,7 @@ from care_core.diagnose.hypotheses import hypotheses_of, speaking, unasked
 from care_core.diagnose.judging import Judged, check_wishes, query_of
 from care_core.diagnose.next_step import bench, trial, was_upset
 from care_core.diagnose.outside import suspects_outside
-from care_core.diagnose.outside.change import ENOUGH, check_first, leading_outside, shown_fix
+from care_core.diagnose.outside.change import check_first, leading_outside, shown_fix
 from care_core.diagnose.parts import unmended
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult, OutsideSuspect
@@ -28,14 +35,13 @@ from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import AGAIN, SAME_AGAIN, AllBack, tell_more
 from care_core.diagnose.unexplained import out_of_reach, refused_otherwise
 from care_core.diagnose.worth import explained, outweighed, promised_causes
-from care_core.ecosystems.findings import NOTHING_SEEN, Finding, Health
+from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.run import Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting, shown
-from care_core.text import listed, percent
-from care_core.variables import Change
+from care_core.text import listed
 
 FROM_HISTORY = "what was changed since this robot's last good run in the history counts as evidence"
 
@@ -124,7 +130,7 @@ def diagnose(
         advised = of_outside(lead, failed, hypotheses, promise)
     else:
         lead = None
-        failed_part = part and unmended(part, _likelier(hypotheses, part, query))
+        failed_part = part and unmended(part, likelier_than(part, hypotheses, failed))
         against = failed_part or outweighed(hypotheses, health.findings)
         options = {s.option for group in found.values() for s in group}
         advised = of_options(failed, judged, faults, hypotheses, options, promise, against, beyond)
@@ -159,20 +165,6 @@ def diagnose(
     )
 
 
-def _likelier(hypotheses: Sequence[Hypothesis], part: Finding, query: CounterfactualQuery) -> str:
-    """The option that is likelier the cause than a part that is mended first; empty where none is."""
-    first = next(iter(hypotheses), None)
-    if first is None or first.what != "parameter" or first.name not in query.config or first.name in query.kept:
-        return ""
-    rival = sum(one.probability for one in hypotheses if one.name == part.title)
-    value, back = query.config[first.name], query.reference[first.name]
-    if first.probability < ENOUGH or first.probability <= rival or value == back:
-        return ""
-    option = query.variables[first.name]
-    goes = f"{first.name} back from {option.show(value)} to {option.show(back)}"
-    return f"then put {goes}, {percent(first.probability)} the cause"
-
-
 def _within_limits(
     judged: Judged,
     schema: Schema,
@@ -189,7 +181,7 @@ def _within_limits(
     weights = _weights(outside)
     told = unasked(health.findings, missed=missed, shown=said, verdict=choice.fit.verdict, outside=weights)
     lead = leading_outside(told, outside, health.findings, run)
-    fix = shown_fix(lead, run) or _shown_back(judged, schema, told, said, health)
+    fix = shown_fix(lead, run) or shown_back(judged, schema, told, said, health.findings)
     return Diagnosis(
         choice,
         run,
@@ -233,23 +225,6 @@ def _tell_more(
         nothing_else=bench(failed.run) if upset else SAME_AGAIN,
         all_back=everything,
     )
-
-
-def _shown_back(
-    judged: Judged, schema: Schema, explained: Sequence[Hypothesis], said: Mapping[str, Evidence], health: Health
-) -> Fix | None:
-    """The option that leads the explanations and that a critical finding speaks of, back at its reference, where no
-    objective could be judged and nothing has odds; None where there is none."""
-    first = next(iter(explained), None)
-    option = next((one for one in schema.options if first is not None and one.name == first.name), None)
-    if first is None or option is None or first.what != "parameter" or first.probability < ENOUGH:
-        return None
-    grave = {one.title for one in health.findings if one.severity == "critical"}
-    shown_by = next((title for title, one in said.items() if title in grave and option.name in one.options), None)
-    value, back = (config.get(option.name) for config in (judged.run.config, judged.reference.config))
-    if shown_by is None or value is None or back is None or value == back or option.safety or not option.accepts(back):
-        return None
-    return Fix((Change(option, value, back),), first.probability, {}, shown_by=shown_by)
 
 
 def _set_wrong(judged: Judged, explained: Sequence[Hypothesis], said: Mapping[str, Evidence]) -> Iterator[str]:

@@ -86,8 +86,9 @@ def _trim_is_off(flight: Flight, output: int) -> bool:
 
 
 def _waits(flight: Flight) -> Iterator[Finding]:
-    moved, turned, delay = flight.one("THR", "Speed"), flight.one("STER", "TurnRate"), flight.setting(_DELAY)
-    if moved is None or turned is None or delay is None or delay < _PIVOT_S or flight.default_left(_DELAY) is None:
+    moved, turned = flight.one("THR", "Speed"), flight.one("STER", "TurnRate")
+    delay, default = flight.setting(_DELAY), flight.default_left(_DELAY)
+    if moved is None or turned is None or delay is None or default is None or delay < _PIVOT_S:
         return
     by_itself = flight.drives_itself(moved.t)
     rate = np.interp(moved.t, turned.t, turned["TurnRate"])
@@ -106,14 +107,14 @@ def _waits(flight: Flight) -> Iterator[Finding]:
         severity="critical" if is_long else "warning",
         evidence=(
             f"{len(spans)} times, for {share:.0%} of the drive (limit {_LONG:.0%}): {_DELAY} is {shown(delay)} s "
-            f"(default {shown(flight.default_left(_DELAY))})"
+            f"(default {shown(default)})"
         ),
         source="THR.Speed, STER.TurnRate; PARM",
         suspect="parameter",
         probability=_SURE,
         mission_lost=None if is_long else _LOST,
         parameters=(_DELAY,),
-        wanted=((_DELAY, flight.default_left(_DELAY) or 0.0),),
+        wanted=((_DELAY, default),),
     )
 
 

@@ -87,15 +87,17 @@ def find(flight: Flight) -> Iterator[Finding]:
     """One finding a surface: one that turns the plane the wrong way goes to its stop as well."""
     if not flight.is_winged:
         return
+    level = straight.straight(flight)
     for surface in _SURFACES:
-        flown = _flown(flight, surface)
+        flown = _flown(flight, surface, level)
         if flown is not None:
             found = _wrong_way(surface, flown) or _at_its_stop(flight, surface, flown)
             if found is not None:
                 yield found
 
 
-def _flown(flight: Flight, surface: _Surface) -> _Flown | None:
+def _flown(flight: Flight, surface: _Surface, level: Floats) -> _Flown | None:
+    """The surface in flight. `level`: times at which it flies straight (s)."""
     rates, outs = flight.one(surface.controller, "Tar", "Act"), flight.one("AETR", surface.output)
     moved, leans = flight.one("GPS", "Spd"), flight.one("ATT", surface.attitude)
     if rates is None or outs is None or moved is None or leans is None:
@@ -106,7 +108,6 @@ def _flown(flight: Flight, surface: _Surface) -> _Flown | None:
         return None
     out = np.interp(t, outs.t, outs[surface.output]) / _FULL
     angle = np.interp(t, leans.t, np.degrees(np.unwrap(np.radians(leans[surface.attitude]))))
-    level = straight.straight(flight)
     middle = straight.held_at(level, outs, surface.output) / _FULL if len(level) else 0.0
     return _Flown(t[acts], out[acts], middle, rates["Tar"][acts], rates["Act"][acts], angle[acts])
 
