@@ -148,13 +148,14 @@ class Advice(Record):
 
     @property
     def _sure(self) -> str:
-        """How likely it is the cause, and how well that is supported."""
+        """How likely it is the cause, and a warning where training says little of that."""
         if self.confidence is None:
             return ""
         if self.cause is None:
             return f" ({self.confidence} confidence in the cause)"
         together = " together" if ", " in self.change else ""
-        return f" ({percent(self.cause)} the cause{together}, {self.confidence} confidence)"
+        doubt = ", weak training support" if self.confidence == "low" else ""
+        return f" ({percent(self.cause)} the cause{together}{doubt})"
 
 
 class Verdict(Record):

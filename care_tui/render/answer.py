@@ -60,7 +60,7 @@ def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: b
     hypotheses = session.hypotheses()
     if hypotheses:
         first = hypotheses[0]
-        doubt = "  low confidence" if _is_doubtful(diagnosis, first) else ""
+        doubt = "  weak training support" if _is_doubtful(diagnosis, first) else ""
         found = [one for one in every_finding(diagnosis.health.findings) if one.title == first.name]
         yield (
             _labelled("Cause")

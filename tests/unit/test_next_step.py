@@ -210,11 +210,12 @@ def test_a_parameter_that_is_to_stay_is_not_put_back() -> None:
     assert next_step(free, has_failed=True) == "put A back as the findings say"
 
 
-def test_a_change_says_how_likely_it_is_the_cause_beside_how_well_that_is_supported() -> None:
+def test_a_change_says_how_likely_it_is_the_cause() -> None:
     made = failed(LATE, fixed=True)
     named, other = Hypothesis("parameter", "land_speed", 0.7), Hypothesis("parameter", "max_speed", 0.2)
     told = replace(made, hypotheses=(named, other))
-    assert "land_speed 16 -> 50 (70% the cause, " in str(verdict_of(told).advice)
+    assert "land_speed 16 -> 50 (70% the cause)" in str(verdict_of(told).advice)
+    assert "(70% the cause, weak training support)" in str(replace(verdict_of(told).advice, confidence="low"))
     document = remembered(published(build_document(told)))
     assert str(remembered_verdict(document).advice) == str(verdict_of(told).advice)
     assert "confidence in the cause" in str(verdict_of(replace(made, hypotheses=(other,))).advice)

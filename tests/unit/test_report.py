@@ -114,7 +114,7 @@ def test_markdown_can_be_pasted_into_a_ticket() -> None:
     answer = text.replace("\\", "")
     assert "\n\n**FAULT**: mission_time 190 s, wanted <= 150 s; motor 2" in answer
     assert (
-        "\n\nChange land_speed 16 -> 50 (70% the cause, high confidence): 90% probability that all objectives are met"
+        "\n\nChange land_speed 16 -> 50 (70% the cause): 90% probability that all objectives are met"
         in answer
     )
     assert "land_speed → land_time → mission_time" in text
