@@ -50,8 +50,9 @@ MESSAGES = "logged_messages"
 SOURCE = "PX4 parameters"
 LEVELS = ("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "NOTICE", "INFO", "DEBUG")
 """Of logged strings, by the digit that they begin with, as the Linux kernel numbers them."""
-_SYSTEM_DEFAULT, _SETUP_DEFAULT = 1, 2
-"""Bits of a default's record: of the system, and of the airframe that is set up, which counts first."""
+_SETUP_DEFAULT = 2
+"""Bit of a default's record that is the airframe's. One of the firmware alone (bit 1) is written where the airframe has a
+default of its own that the value does not differ from (`Logger::write_parameter_defaults`)."""
 _VEHICLE_TYPES = {1: "multicopter", 2: "fixed wing", 3: "rover", 4: "airship"}
 _GPS_TOPICS = ("vehicle_gps_position", "sensor_gps")
 _EARLIEST_S = datetime(2005, 1, 1, tzinfo=timezone.utc).timestamp()
@@ -212,7 +213,8 @@ class Px4Log:
         return np.maximum(stamps_us - self._first_us, 0.0) / 1e6
 
     def _history(self, contents: UlogContents, times: _Times, unread: list[Damage]) -> dict[str, tuple[Setting, ...]]:
-        """Every parameter with its default (the log names those that differ from the value) and its changes."""
+        """Every parameter with the airframe's default (the log names those that differ from the value) and its
+        changes."""
         initial = [one for one in contents.others if one.byte < contents.logging_byte]
         later = [one for one in contents.others if one.byte >= contents.logging_byte and one.kind == PARAMETER]
         defaults = _defaults(contents.others, unread)
@@ -331,16 +333,9 @@ def _keyed(others: Iterable[Other], kind: int, unread: list[Damage]) -> dict[str
 
 
 def _defaults(others: Sequence[Other], unread: list[Damage]) -> dict[str, Value]:
-    """The defaults of parameters: the airframe's where it has one of its own, else the system's."""
-    system: dict[str, Value] = {}
-    setup: dict[str, Value] = {}
-    for one in others:
-        if one.kind == DEFAULT:
-            own = _keyed([Other(one.byte, DEFAULT, one.body[1:])], DEFAULT, unread)
-            for bit, defaults in ((_SYSTEM_DEFAULT, system), (_SETUP_DEFAULT, setup)):
-                if one.body[0] & bit:
-                    defaults.update(own)
-    return {**system, **setup}
+    """The airframe's defaults of the parameters that differ from them."""
+    own = [one for one in others if one.kind == DEFAULT and one.body[0] & _SETUP_DEFAULT]
+    return _keyed([Other(one.byte, DEFAULT, one.body[1:]) for one in own], DEFAULT, unread)
 
 
 def _dropouts(others: Iterable[Other], times: _Times) -> list[Damage]:

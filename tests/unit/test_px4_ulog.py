@@ -89,7 +89,7 @@ def assert_same_parameters(log: Px4Log, peer: Any) -> None:
     assert {name: np.float32(values[0].value) for name, values in settings.items()} == {
         name: np.float32(value) for name, value in numbers.items()
     }
-    defaults = {**peer.get_default_parameters(0), **peer.get_default_parameters(1)}
+    defaults = peer.get_default_parameters(1)
     for name, value in numbers.items():
         default = settings[name][0].default
         assert (default is None) == (not peer.has_default_parameters)

@@ -214,7 +214,9 @@ def test_what_only_newer_programs_can_read_is_said() -> None:
     ]
 
 
-def test_defaults_of_the_airframe_count_before_the_systems(tmp_path: Path) -> None:
+def test_a_parameter_is_held_against_the_default_of_its_airframe(tmp_path: Path) -> None:
+    """A default of the firmware alone stands beside a value that is the airframe's own."""
+
     def parameter(kind: bytes, name: str, value: float, bits: int | None = None) -> bytes:
         whole = ulog_keyed(kind, f"float {name}".encode(), struct.pack("<f", value))
         return whole if bits is None else ulog_record(kind, bytes([bits]) + whole[3:])
@@ -223,6 +225,7 @@ def test_defaults_of_the_airframe_count_before_the_systems(tmp_path: Path) -> No
     begin = head("alpha:uint64_t timestamp;", flags=flags)
     begin += parameter(b"P", "A", 1.0) + parameter(b"P", "B", 2.0) + parameter(b"P", "C", 3.0)
     begin += parameter(b"Q", "A", 1.5, 1) + parameter(b"Q", "A", 1.25, 2) + parameter(b"Q", "B", 2.5, 3)
+    begin += parameter(b"Q", "C", 4.5, 1)
     later = (
         message(1, START_US) + message(1, START_US + 2_000_000) + parameter(b"P", "A", 9.0) + parameter(b"P", "A", 9.0)
     )
