@@ -115,6 +115,21 @@ def test_a_frozen_receiver_leads_and_no_barometer_is_blamed_for_it() -> None:
     assert "barometer" not in [one.kind for one in findings]
 
 
+def test_where_a_receiver_without_a_fix_puts_a_vehicle_it_never_was() -> None:
+    flight = made()
+    for name in ("GPS", "POS"):
+        for field in ("Lat", "Lng"):
+            flight.table[name][field][:] = flight.table[name][field][0]
+    flight.table["GPS"]["Status"][flight.after(30.0)] = 1
+    flight.table["GPS"]["Lat"][flight.after(35.0)] += 0.5
+    for column in flight.table["ATT"].values():
+        column[:] = 0.0
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("BARO", "Alt"), ("GPS", "Alt")):
+        flight.table[name][field][:] = 0.0
+    freeze(flight, "BAT")
+    assert "the battery's monitor is frozen" not in [one.title for one in frozen(flight.find())]
+
+
 def test_a_source_that_freezes_for_a_while_is_named_once() -> None:
     flight = made()
     freeze(flight, "IMU", 25.0, 31.0)

@@ -188,7 +188,7 @@ def motion_of(flight: Armed, span: Span, but: str) -> Motion:
         table = None if name == but else flight.one(name, *fields)
         return None if table is None else table.between(*span)
 
-    places = [one for name in ("POS", "GPS") if (one := told(name, "Lat", "Lng")) is not None]
+    places = [_fixed(one) for name in ("POS", "GPS") if (one := told(name, "Lat", "Lng")) is not None]
     angles = told("ATT", "Roll", "Pitch", "Yaw")
     heights = (
         []
