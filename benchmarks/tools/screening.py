@@ -1,4 +1,4 @@
-"""Writes `care_core/metadata/ardupilot_screening.tsv` from flights with one parameter wrong at a time.
+"""Writes `care_core/metadata/screening.tsv` from flights with one parameter wrong at a time.
 
 usage: python -m benchmarks.tools.screening FOLDER VEHICLE REFERENCES
 

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 from care_core.configs.driven import readable
 from care_core.ecosystems.vehicles import vehicle_of
-from care_core.metadata import ardupilot, navigation
+from care_core.metadata import navigation
 from care_core.metadata.fact import Fact
+from care_core.metadata.firmware import fact_of
 from care_core.run import Setting, shown
 from care_core.variables import Variable
 
@@ -73,4 +74,4 @@ def _fact(parameter: str, settings: Mapping[str, Setting], facts: Mapping[str, s
         ros: navigation.Ros = "ros2" if "." in parameter else "ros1"
         return navigation.fact_of(ros, parameter, facts.get("distro", ""))
     vehicle = vehicle_of(facts, settings)
-    return None if vehicle.kind == "px4" else ardupilot.fact_of(parameter, vehicle.kind, vehicle.version)
+    return fact_of(parameter, vehicle.kind, vehicle.version)

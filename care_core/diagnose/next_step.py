@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from care_core.diagnose.hypotheses import first_named
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
 from care_core.diagnose.records import Diagnosis, Fix, Hypothesis, helps
 from care_core.ecosystems.findings import (
@@ -151,7 +152,8 @@ def _undone(diagnosis: Diagnosis) -> str:
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
     if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
-    named = first if first is not None and first.what == "parameter" and first.name else None
+    leading = first_named(diagnosis.hypotheses)
+    named = leading if leading is not None and leading.what == "parameter" else None
     if named is not None and _is_kept(named.name, diagnosis):
         return f"let {named.name} change as well: without it nothing is likely enough"
     said = None if named is None else next((one for one in findings if _says(one, named.name)), None)

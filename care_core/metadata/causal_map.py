@@ -13,11 +13,11 @@ from typing import Literal, TypeVar, get_args
 
 from care_core.files import read_small_text
 from care_core.metadata.aliases import aliases_of
-from care_core.metadata.ardupilot import VEHICLES
 from care_core.metadata.fact import expanded
+from care_core.metadata.firmware import PX4, letter_of
 from care_core.records import Record
 
-TABLE = Path(__file__).with_name("ardupilot_map.tsv")
+TABLE, TABLE_OF_PX4 = (Path(__file__).with_name(f"{firmware}_map.tsv") for firmware in ("ardupilot", "px4"))
 
 Role = Literal["choice", "safety", "calibration", "wiring", "written", "idle"]
 """Who sets a parameter, and for what: an operator's choice (gains, speeds, heights); a protection (failsafes, arming
@@ -73,11 +73,11 @@ class _Map(Record):
 
 
 def meaning_of(name: str, kind: str) -> Meaning | None:
-    """What a parameter does on a kind of vehicle (`ardupilot.VEHICLES`), under any of the names that it has had: by its
-    own row, else by the longest family that it belongs to. None where the map does not know it."""
-    if kind not in VEHICLES:
+    """What a parameter does on a kind of vehicle, under any of the names that it has had: by its own row, else by the
+    longest family that it belongs to. None where the map does not know it."""
+    if not letter_of(kind):
         return None
-    held = _map_of(VEHICLES[kind])
+    held = _map_of(TABLE_OF_PX4 if kind == PX4 else TABLE, letter_of(kind))
     names = dict.fromkeys((name, *(one.name for one in aliases_of(name, kind))))
     beginnings = (one[:length] for one in names for length in range(len(one), 0, -1))
     found = next((held.names[one] for one in names if one in held.names), None)
@@ -92,11 +92,11 @@ def _meaning(name: str, cells: _Cells) -> Meaning:
 
 
 @cache
-def _map_of(vehicle: str) -> _Map:
+def _map_of(table: Path, vehicle: str) -> _Map:
     """The map of the vehicle with this letter: a row for it counts before one for all."""
     names: dict[str, _Cells] = {}
     families: dict[str, _Cells] = {}
-    rows = [line.split("\t") for line in read_small_text(TABLE).splitlines() if not line.startswith("#")][1:]
+    rows = [line.split("\t") for line in read_small_text(table).splitlines() if not line.startswith("#")][1:]
     for pattern, vehicles, role, part, read, signs in sorted(rows, key=lambda row: row[1] != ""):
         if vehicles and vehicle not in vehicles:
             continue

@@ -13,6 +13,7 @@ from care_core.records import Record
 _TABLE = Path(__file__).with_name("px4.tsv")
 RELEASES = ("1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12", "1.13", "1.14", "1.15", "1.16", "1.17", "1.18")
 SOURCE = "PX4's parameter reference"
+OWNER = "PX4"
 RENAMED: Mapping[str, tuple[str, float]] = {
     **{f"MPC_{axis}_VEL_{gain}": (f"MPC_{axis}_VEL_{gain}_ACC", 20.0) for axis in ("XY", "Z") for gain in "PID"},
     **{f"EKF2_GPS_POS_{axis}": (f"SENS_GPS0_OFF{axis}", 1.0) for axis in "XYZ"},
@@ -58,6 +59,13 @@ def facts_of(name: str, releases: Iterable[str] = RELEASES) -> tuple[Fact, ...]:
     return tuple(_fact(name, row, told) for row in _rows().get(name, ()) if (told := wanted.intersection(row.releases)))
 
 
+def fact_of(name: str, version: tuple[int, ...] | None = None) -> Fact | None:
+    """What a release says of a parameter; the newest that knows it where the version is unknown."""
+    exact = [] if version is None else [".".join(map(str, version[:2]))]
+    found = facts_of(name, exact) or facts_of(name)
+    return found[-1] if found else None
+
+
 def span(releases: Iterable[str]) -> str:
     """Releases in words: PX4 1.15, or PX4 1.13 to 1.17."""
     told = sorted(releases, key=RELEASES.index)
@@ -69,7 +77,7 @@ def _fact(name: str, row: _Row, releases: Iterable[str]) -> Fact:
     told = span(releases)
     return Fact(
         name,
-        "PX4",
+        OWNER,
         f"{SOURCE}, {told}",
         type=_TYPES[kind],
         default=default,

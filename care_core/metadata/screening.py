@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import cast
 
 from care_core.files import read_small_text
-from care_core.metadata.ardupilot import VEHICLES
 from care_core.metadata.causal_map import SIGNS, Sign
+from care_core.metadata.firmware import letter_of
 from care_core.records import Record
 
-TABLE = Path(__file__).with_name("ardupilot_screening.tsv")
+TABLE = Path(__file__).with_name("screening.tsv")
 
 
 _OF_LIFT = "Q_"
@@ -39,12 +39,12 @@ def plain_refusal(text: str) -> str:
 
 def flights_of(name: str, kind: str) -> tuple[Flight, ...]:
     """The screening flights of a parameter on a kind of vehicle; empty where it was not screened."""
-    return tuple(map(_flight, _lines().get((name, VEHICLES.get(kind, "")), ())))
+    return tuple(map(_flight, _lines().get((name, letter_of(kind)), ())))
 
 
 def screened(kind: str) -> tuple[str, ...]:
     """The parameters that were screened on a kind of vehicle; a plane has no lift motors."""
-    own = (name for name, letter in _lines() if letter == VEHICLES.get(kind))
+    own = (name for name, letter in _lines() if letter == letter_of(kind))
     return tuple(name for name in own if kind != "plane" or not name.startswith(_OF_LIFT))
 
 

@@ -1,14 +1,24 @@
-"""What each parameter of ArduPilot does: the table, and how a parameter finds its row."""
+"""What each parameter of ArduPilot and PX4 does: the tables, and how a parameter finds its row."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from care_core.metadata import ardupilot
-from care_core.metadata.causal_map import READS, ROLES, SIGNS, TABLE, meaning_of
+from care_core.metadata import ardupilot, px4
+from care_core.metadata.causal_map import READS, ROLES, SIGNS, TABLE, TABLE_OF_PX4, meaning_of
 from care_core.metadata.fact import expanded
 
-ROWS = [line.split("\t") for line in TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")][1:]
+
+def rows_of(table: Path) -> list[list[str]]:
+    lines = table.read_text(encoding="utf-8").splitlines()
+    return [line.split("\t") for line in lines if not line.startswith("#")][1:]
+
+
+ROWS, PX4_ROWS = rows_of(TABLE), rows_of(TABLE_OF_PX4)
+EITHER = pytest.mark.parametrize("rows", [ROWS, PX4_ROWS], ids=["ardupilot", "px4"])
+PX4_RELEASES = {"1.13", "1.14", "1.15", "1.16", "1.17"}
 UNDOCUMENTED = {
     "AMP_PER_VOLT", "ANGLE_RATE_MAX", "AXIS_ENABLE", "EPM_*", "FRAME", "FS_GPS_ENABLE", "GCS_SYSID", "GPSGLITCH_*",
     "HLD_*", "INAV_TC_*", "INS_MPU6K_FILTER", "LED_MODE", "LOITER_{LAT|LON}_*", "LOW_VOLT",
@@ -18,41 +28,47 @@ UNDOCUMENTED = {
 """Rows of parameters that only firmware before the first release of the table has, or only the simulator."""
 
 
-def test_every_row_is_in_known_words() -> None:
-    for _, vehicles, role, part, read, signs in ROWS:
+@EITHER
+def test_every_row_is_in_known_words(rows: list[list[str]]) -> None:
+    for _, vehicles, role, part, read, signs in rows:
         assert role in ROLES
         assert read
         assert set(read.split()) <= set(READS)
         assert set(signs.split()) <= set(SIGNS)
         assert set(vehicles) <= set("CPRST")
         assert 0 < len(part.split()) <= 3
-    assert sorted(ROWS) == ROWS
+    assert sorted(rows) == rows
 
 
-def test_what_nothing_reads_shows_nothing_and_what_is_safety_shows_something() -> None:
-    for pattern, _, role, _, read, signs in ROWS:
+@EITHER
+def test_what_nothing_reads_shows_nothing_and_what_is_safety_shows_something(rows: list[list[str]]) -> None:
+    for pattern, _, role, _, read, signs in rows:
         if read == "never":
             assert not signs, pattern
-        if role == "safety":
+        if role == "safety" and read != "never":
             assert signs, pattern
         assert (role == "idle") <= (read == "never"), pattern
 
 
-def test_every_row_is_of_parameters_that_are_known() -> None:
-    known = set(ardupilot.names())
+def strangers(rows: list[list[str]], known: set[str]) -> set[str]:
     beginnings = {name[:length] for name in known for length in range(1, len(name) + 1)}
-    strangers = {
+    return {
         row[0]
-        for row in ROWS
+        for row in rows
         if known.isdisjoint(expanded(row[0]))
         and not any(one.endswith("*") and one[:-1] in beginnings for one in expanded(row[0]))
     }
-    assert strangers == UNDOCUMENTED
 
 
-def test_no_row_stands_twice() -> None:
+def test_every_row_is_of_parameters_that_are_known() -> None:
+    assert strangers(ROWS, set(ardupilot.names())) == UNDOCUMENTED
+    assert not strangers(PX4_ROWS, set(px4.names()))
+
+
+@EITHER
+def test_no_row_stands_twice(rows: list[list[str]]) -> None:
     named = [
-        (one, vehicle) for pattern, vehicles, *_ in ROWS for one in expanded(pattern) for vehicle in vehicles or "*"
+        (one, vehicle) for pattern, vehicles, *_ in rows for one in expanded(pattern) for vehicle in vehicles or "*"
     ]
     assert len(named) == len(set(named))
 
@@ -62,6 +78,11 @@ def test_every_documented_parameter_has_a_meaning(kind: str) -> None:
     letter = ardupilot.VEHICLES[kind]
     own = [name for name in ardupilot.names() if any(one.vehicle == letter for one in ardupilot.known_in(name))]
     assert [name for name in own if meaning_of(name, kind) is None] == []
+
+
+def test_every_parameter_of_px4_has_a_meaning() -> None:
+    own = [name for name in px4.names() if PX4_RELEASES & px4.known_in(name)]
+    assert [name for name in own if meaning_of(name, "px4") is None] == []
 
 
 def test_a_name_counts_before_its_family_and_a_longer_family_before_a_shorter() -> None:
@@ -134,4 +155,4 @@ def test_what_is_read_in_no_flight_clears_a_parameter() -> None:
 
 def test_what_no_table_knows_has_no_meaning() -> None:
     assert meaning_of("XYZ_NOTHING", "copter") is None
-    assert meaning_of("RC_SPEED", "px4") is None
+    assert meaning_of("RC_SPEED", "unknown") is None

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import care_core
 from care_core.application.case import Case, predict
+from care_core.diagnose.hypotheses import first_named
 from care_core.diagnose.outside.change import (
     Advisable,
     check_first,
@@ -47,6 +48,38 @@ def setting(name: str, value: float, default: float | None = None) -> dict[str, 
 def suspects(settings: dict[str, Setting], signs: Signs, good: dict[str, Setting] | None = None) -> dict[str, float]:
     off = off_parameters(settings, COPTER, (), good)
     return {one.name: one.weight for one in outside_suspects(off, signs, EVERYTHING, "copter")}  # type: ignore[arg-type]
+
+
+def test_what_lost_no_flight_is_told_where_a_limit_is_missed_that_it_acts_on() -> None:
+    """The value was flown and kept its limit, which does not say by how much: PSC_VEL_D of a rover."""
+    rover = replace(COPTER, kind="rover")
+    strays = Signs(frozenset({"strays"}), frozenset({"strays"}))
+    driven = {**setting("PSC_VEL_D", 1, 0), **setting("MOT_SPD_SCA_BASE", 0.1, 1)}
+    found = outside_suspects(off_parameters(driven, rover, (), None), strays, EVERYTHING, "rover")
+    assert [(one.name, one.is_learned) for one in found] == [("PSC_VEL_D", False), ("MOT_SPD_SCA_BASE", False)]
+    assert sum(one.weight for one in found) == pytest.approx(0.02)
+    upset = Signs(frozenset({"upset"}), frozenset({"upset", "strays"}))
+    assert not outside_suspects(off_parameters(driven, rover, (), None), upset, EVERYTHING, "rover")
+
+
+def test_a_parameter_that_nothing_knows_does_not_hide_the_first_that_is_named() -> None:
+    unknown, named = Hypothesis("parameter", "", 0.5), Hypothesis("parameter", "PSC_VEL_D", 0.4)
+    assert first_named((unknown, named)) == named
+    assert first_named((unknown,)) is None
+
+
+PX4_QUAD = Vehicle("px4", "quad", "PX4 v1.15.4", (1, 15, 4))
+
+
+def test_a_px4_parameter_is_held_against_its_airframe_and_known_by_its_part() -> None:
+    driven = {**setting("SENS_BOARD_ROT", 4, 0), **setting("SENS_BOARD_X_OFF", 1e-6, 0), **setting("CAL_MAG0_ID", 7, 0)}
+    (off,) = off_parameters(driven, PX4_QUAD, (), None)
+    assert (off.name, off.meaning.part, off.meaning.role, off.is_code) == (
+        "SENS_BOARD_ROT", "board orientation", "wiring", True,
+    )  # fmt: skip
+    assert not list(off_parameters({**setting("MPC_XY_TRAJ_P", 0.9)}, PX4_QUAD, (), None))  # no default in the log
+    option = outside_option("MIS_TAKEOFF_ALT", 2.5, PX4_QUAD)
+    assert (option.unit, option.range) == ("m", None)
 
 
 def test_a_parameter_at_its_default_is_not_off() -> None:

@@ -113,10 +113,7 @@ def test_markdown_can_be_pasted_into_a_ticket() -> None:
     assert "\n\nProfile arducopter partly fits: firmware" in text
     answer = text.replace("\\", "")
     assert "\n\n**FAULT**: mission_time 190 s, wanted <= 150 s; motor 2" in answer
-    assert (
-        "\n\nChange land_speed 16 -> 50 (70% the cause): 90% probability that all objectives are met"
-        in answer
-    )
+    assert "\n\nChange land_speed 16 -> 50 (70% the cause): 90% probability that all objectives are met" in answer
     assert "land_speed → land_time → mission_time" in text
     assert "```diff\n--- as driven" in text
 

@@ -36,7 +36,7 @@ def suspects_outside(
         query: what its configuration is expected to do, by the profile `schema`; None where no model can be asked.
         good: the parameters of the last good run, None where none is known.
     """
-    if format_named(run.log.format).ecosystem != "ardupilot":
+    if not _is_mapped(run):
         return ()
     vehicle = vehicle_of_run(run)
     modelled = {name for option in schema.options for name in readable(option)} if schema is not None else set()
@@ -47,3 +47,9 @@ def suspects_outside(
     has_begun = any(event.text.startswith(begins) for event in health.timeline)
     signs = signs_of(run, broken, health, schema, query)
     return outside_suspects(off, signs, phases_of(run, has_begun), vehicle.kind)
+
+
+def _is_mapped(run: Run) -> bool:
+    """Whether the causal map has parameters of such a robot: ArduPilot's vehicles and PX4's multicopters."""
+    ecosystem = format_named(run.log.format).ecosystem
+    return ecosystem == "ardupilot" or (ecosystem == "px4" and run.log.facts.get("vehicle") == "multicopter")

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import cast, get_args
 
+from care_core.diagnose.hypotheses import first_named
 from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect
 from care_core.ecosystems.findings import Finding, every_finding
 from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.ecosystems.vehicles.vehicle import Kind, Vehicle
-from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import Role as ParameterRole
 from care_core.metadata.causal_map import meaning_of
 from care_core.metadata.fact import Fact
+from care_core.metadata.firmware import fact_of, is_code
 from care_core.metadata.navigation import mended
 from care_core.records import Record, replace
 from care_core.run import Run, shown
@@ -45,12 +46,13 @@ class Advisable(Record):
 def leading_outside(
     hypotheses: Sequence[Hypothesis], suspects: Sequence[OutsideSuspect], findings: Sequence[Finding], run: Run
 ) -> Advisable | None:
-    """The parameter outside the profile that leads the ranking, None where another explanation does.
+    """The parameter outside the profile that leads the ranking, None where another explanation does: one that is not
+    named leads none.
 
     A change of it is advised where the log measures the value, or where flights with such a value were lost in this way
     and nothing but its operator's choice stands against the default. What protects is never put back by advice.
     """
-    first = next(iter(hypotheses), None)
+    first = first_named(hypotheses)
     if first is None or first.what != "parameter" or first.name in run.config:
         return None
     setting, meaning = run.settings.get(first.name), meaning_of(first.name, vehicle_of_run(run).kind)
@@ -126,7 +128,7 @@ def shown_fix(lead: Advisable | None, run: Run) -> Fix | None:
 
 def outside_option(name: str, default: float | None, vehicle: Vehicle) -> Variable:
     """A parameter that no profile models, as an option: with what the firmware's documentation says of it."""
-    fact = ardupilot.fact_of(name, vehicle.kind, vehicle.version)
+    fact = fact_of(name, vehicle.kind, vehicle.version)
     meaning, shown_by_logs = meaning_of(name, vehicle.kind), mended(name)
     return Variable(
         name=name,
@@ -146,8 +148,7 @@ def _type(name: str, fact: Fact | None) -> ValueType:
     known = mended(name)
     if known is not None and known.type in get_args(ValueType):
         return cast(ValueType, known.type)
-    is_code = fact is not None and bool(fact.values) and fact.low is None
-    return "int" if is_code else "float"
+    return "int" if fact is not None and is_code(fact) else "float"
 
 
 def check_first(one: Advisable) -> str:

@@ -10,12 +10,15 @@ from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import Meaning, meaning_of
+from care_core.metadata.firmware import fact_of, is_code
 from care_core.records import Record
 from care_core.run import Setting
 
 TABLED = (4, 3), (4, 6)
 """Releases whose defaults are about those of the table, where a log holds none."""
 _AT_EVERY_START = re.compile(r"INS\d?_GYR\d?_?OFF.*|COMPASS_PRIO\d_ID|.*_DEV_?ID\d?|BARO\d_GND_PRESS|STAT_.*")
+UNFELT = 1e-5
+"""What differs from 0 by less only marks a calibration as done (SENS_BOARD_X_OFF of PX4's simulated airframes)."""
 UNCHOSEN = frozenset(("written", "idle"))
 """Roles of parameters that lose no mission: outcomes, and what moves no vehicle."""
 
@@ -61,7 +64,7 @@ def off_parameters(
         is_unknown = good is None or (name not in good and is_self_written(name))
         is_changed = None if is_unknown else last_good is None or not same_value(last_good, setting.value)
         back = default if default is not None else last_good
-        if back is None or (same_value(default, setting.value) and not is_changed):
+        if back is None or (_is_default(default, setting.value) and not is_changed):
             continue
         meaning = meaning_of(name, vehicle.kind)
         if meaning is None or meaning.role in UNCHOSEN:
@@ -75,6 +78,10 @@ def off_parameters(
             *_documented(name, float(setting.value), vehicle),
             last_good,
         )
+
+
+def _is_default(default: float | None, value: float) -> bool:
+    return same_value(default, value) or (default == 0 and abs(value) < UNFELT)
 
 
 def _is_nobodys(name: str) -> bool:
@@ -92,9 +99,9 @@ def _default(setting: Setting, vehicle: Vehicle) -> float | None:
 
 def _documented(name: str, value: float, vehicle: Vehicle) -> tuple[bool, bool]:
     """Whether a value lies outside what is documented, and whether it is a code."""
-    fact = ardupilot.fact_of(name, vehicle.kind, vehicle.version)
+    fact = fact_of(name, vehicle.kind, vehicle.version)
     if fact is None:
         return False, False
     if fact.low is not None and fact.high is not None:
-        return not fact.low <= value <= fact.high, False
-    return bool(fact.values) and value not in {code for code, _ in fact.values}, bool(fact.values or fact.bits)
+        return not fact.low <= value <= fact.high, is_code(fact)
+    return bool(fact.values) and value not in {code for code, _ in fact.values}, is_code(fact)

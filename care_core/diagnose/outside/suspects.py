@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from care_core.diagnose.outside.off import OffParameter
 from care_core.diagnose.outside.signs import Signs
 from care_core.diagnose.records import OutsideSuspect
-from care_core.metadata.causal_map import Meaning, Read, Role
+from care_core.metadata.causal_map import Meaning, Read, Role, Sign
 from care_core.metadata.screening import Flight, flights_of
 from care_core.run import Run, shown
 from care_core.text import listed
@@ -38,6 +38,13 @@ BUILT: frozenset[Role] = frozenset(("wiring", "calibration"))
 """Roles of parameters that are off on every sound vehicle: one among many others is off for a good reason."""
 LEAST = 0.02
 """What is less likely is no suspect."""
+NEARLY, LEAST_OF_IT = 0.02, 0.002
+"""Probability that a limit is missed by one of the values that lost no flight, shared by all that act on it; and the
+share from which one of them is told. A flight that kept its limit does not say by how much."""
+_LIMITED: frozenset[Sign] = frozenset(
+    ("strays", "costly", "slow_takeoff", "slow_cruise", "slow_hold", "slow_rtl", "slow_land")
+)
+"""Signs of a mission that was flown, and missed a limit."""
 
 
 def outside_suspects(
@@ -49,18 +56,39 @@ def outside_suspects(
         read: the phases and protections of this run (`phases_of`).
     """
     every = list(off)
+    acting = [one for one in every if one.meaning.read & read]
     built = {(one.meaning.role, _block(one.name)) for one in every if one.is_changed is not True}
     counts = Counter(role for role, _ in built)
     found = []
-    for one in every:
-        if not one.meaning.read & read:
-            continue
+    for one in acting:
         flights = flights_of(one.name, kind)
         like = [flight for flight in flights if flight.is_lost and _is_alike(flight, signs)]
         weight = _wrong(one, flights, counts) * _shows(one, flights, like, signs)
         if weight >= LEAST:
             found.append(_suspect(one, weight, _flown(one.value, like)))
+    if not found:
+        found.extend(_just_missing(acting, signs, kind))
     return tuple(sorted(found, key=lambda suspect: (-suspect.weight, suspect.name)))
+
+
+def _just_missing(acting: Iterable[OffParameter], signs: Signs, kind: str) -> Iterator[OutsideSuspect]:
+    """Parameters that lost no flight and act on the limit that was missed, as far as they are off."""
+    if not signs.first or not signs.first <= _LIMITED:
+        return
+    flown = [(one, flights_of(one.name, kind)) for one in acting if one.meaning.signs & signs.first]
+    ways = [(one, _farthest(one, flights)) for one, flights in flown if flights and not any(f.is_lost for f in flights)]
+    total = sum(way for _, way in ways)
+    for one, way in ways:
+        weight = NEARLY * way / max(1.0, total)
+        if weight >= LEAST_OF_IT:
+            yield _suspect(one, weight, "")
+
+
+def _farthest(one: OffParameter, flights: Sequence[Flight]) -> float:
+    """How far a value is on the way to the farthest that was flown, at most 1."""
+    reference = flights[0].reference
+    side = [flight for flight in flights if (flight.value - reference) * (one.value - reference) > 0]
+    return 1.0 if one.is_code else min((min(1.0, abs(_way(one.value, flight))) for flight in side), default=0.0)
 
 
 def _block(name: str) -> str:
@@ -87,11 +115,11 @@ def phases_of(run: Run, has_begun: bool) -> frozenset[Read]:
     if has_begun:
         read |= {"navigation", "hold", "land"}
         asked = dict(run.mission.asked)
-        if asked.get("returns") or any("rtl" in mode for mode in modes):
+        if asked.get("returns") or any("rtl" in mode or mode == "return" for mode in modes):
             read.add("rtl")
-    if any("guided" in mode for mode in modes):
+    if any("guided" in mode or mode == "offboard" for mode in modes):
         read.add("guided")
-    if modes - {"auto", "rtl", "land", "guided", "smart rtl", "hold"}:
+    if modes - _BY_ITSELF:
         read.add("manual")
     for phase, switch in _SWITCHES.items():
         setting = run.settings.get(switch)
@@ -100,6 +128,10 @@ def phases_of(run: Run, has_begun: bool) -> frozenset[Read]:
     return frozenset(read)
 
 
+_BY_ITSELF = frozenset(
+    ("auto", "rtl", "land", "guided", "smart rtl", "hold", "mission", "return", "takeoff", "offboard", "descend")
+)
+"""Modes that no pilot flies: ArduPilot's and PX4's."""
 _SWITCHES: Mapping[Read, str] = {
     "fence": "FENCE_ENABLE", "terrain": "TERRAIN_ENABLE", "rangefinder": "RNGFND1_TYPE", "flow": "FLOW_TYPE",
     "beacon": "BCN_TYPE", "airspeed": "ARSPD_TYPE",
