@@ -51,8 +51,8 @@ SOURCE = "PX4 parameters"
 LEVELS = ("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "NOTICE", "INFO", "DEBUG")
 """Of logged strings, by the digit that they begin with, as the Linux kernel numbers them."""
 _SETUP_DEFAULT = 2
-"""Bit of a default's record that is the airframe's. One of the firmware alone (bit 1) is written where the airframe has a
-default of its own that the value does not differ from (`Logger::write_parameter_defaults`)."""
+"""Bit of a default's record that is the airframe's. One of the firmware alone (bit 1) is written where the airframe has
+a default of its own that the value does not differ from (`Logger::write_parameter_defaults`)."""
 _VEHICLE_TYPES = {1: "multicopter", 2: "fixed wing", 3: "rover", 4: "airship"}
 _GPS_TOPICS = ("vehicle_gps_position", "sensor_gps")
 _EARLIEST_S = datetime(2005, 1, 1, tzinfo=timezone.utc).timestamp()

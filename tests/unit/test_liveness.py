@@ -90,6 +90,16 @@ def test_an_attitude_that_freezes_has_lost_no_control() -> None:
     assert not [one for one in findings if one.kind == "attitude"]
 
 
+def test_a_straight_drive_over_flat_ground_turns_no_attitude() -> None:
+    """A rover on one heading: its attitude is logged to 0.01 degrees."""
+    drive = made()
+    drive.facts = {"firmware": "ArduRover V4.5.4 (fd1bcc61)", "vehicle": "rover"}
+    drive.rows["MODE"] = [(0.0, {"ModeNum": 10.0})]
+    for field, angle in (("Roll", 0.07), ("Pitch", 0.03), ("Yaw", 99.09)):
+        drive.table["ATT"][field][drive.after(30.0, 42.0)] = angle
+    assert "the attitude is frozen" not in [one.title for one in frozen(drive.find())]
+
+
 def test_a_height_that_reads_zero_in_flight_is_frozen_although_by_it_nothing_flies() -> None:
     flight = made()
     flight.table["POS"]["RelHomeAlt"][flight.after(30.0)] = 0.0

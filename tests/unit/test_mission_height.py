@@ -50,7 +50,15 @@ def test_the_height_of_its_return_belongs_to_a_mission_that_returns() -> None:
     made = flown(150.0)
     for _, item in made.rows["CMD"]:
         item["CTot"] = 4.0
-    home = {"CNum": 3.0, "CId": 20.0, "Lat": 0.0, "Lng": 0.0, "Alt": 0.0, "Frame": 3.0, "CTot": 4.0}
+    home: dict[str, float | str] = {
+        "CNum": 3.0,
+        "CId": 20.0,
+        "Lat": 0.0,
+        "Lng": 0.0,
+        "Alt": 0.0,
+        "Frame": 3.0,
+        "CTot": 4.0,
+    }
     made.rows["CMD"].append((1.0, home))
     assert list(mission_height.find(made.flight()))
     made.settings["RTL_ALTITUDE"] = 120.0

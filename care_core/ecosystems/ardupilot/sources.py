@@ -84,6 +84,11 @@ READS: Wanted = merge_needs((
 ATTITUDE = tuple(source for source in SOURCES if source.message == "ATT")
 
 
+def _moved(source: Live, flight: Armed) -> Motion:
+    """What others must tell: a drive straight ahead turns nothing, and its attitude is logged to 0.01 degrees."""
+    return source.moved if source not in ATTITUDE or flies(flight.mode_kind) else _SHOWS.heading
+
+
 def frozen(flight: Armed, moving: Sequence[Span], sources: Sequence[Live] = SOURCES) -> Iterator[Frozen]:
     """Every stretch in which a source says the same while others tell that the vehicle moved, in spans in which it
     does: what stands on the ground moves by its estimate alone."""
@@ -106,7 +111,7 @@ def frozen(flight: Armed, moving: Sequence[Span], sources: Sequence[Live] = SOUR
                     continue  # one throttle takes one current, and moves no sensor that counts in steps
                 for part in overlaps(span, moving, source.seconds):
                     motion = motion_of(flight, part, source.message)
-                    if motion.reaches(source.moved):
+                    if motion.reaches(_moved(source, flight)):
                         one = Frozen(source, name, span, count, motion)
                         if not is_part(one, told):
                             told.append(one)

@@ -12,11 +12,11 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.held_missions import PLACES, RETURN, TAKEOFF, HeldMission
-from care_core.ecosystems.ardupilot.spans import Floats
+from care_core.ecosystems.ardupilot.spans import Floats, during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.vehicles import way_of
+from care_core.ecosystems.vehicles import flies, way_of
 from care_core.logs.base import Wanted
 from care_core.run import shown
 
@@ -38,7 +38,7 @@ _RETURN_M = "RTL_ALTITUDE", "RTL_ALT_M"
 def find(flight: Flight) -> Iterator[Finding]:
     """The first time that it flies a mission so far above it."""
     known = flight.estimated_height
-    if known is None or not flight.armed or flight.lost_control_s is not None:
+    if known is None or not flies(flight.mode_kind) or flight.lost_control_s is not None:
         return
     t, height = known
     for mission, until_s in _flown(flight):
@@ -47,7 +47,8 @@ def find(flight: Flight) -> Iterator[Finding]:
             continue
         limit = highest + max(_ABOVE_M, _TIMES * highest)
         by_itself = np.array([way_of(flight.mode_kind, int(mode)) == "mission" for mode in flight.modes_at(t)])
-        spans = lasting(t, (height > limit) & by_itself & (t >= mission.since_s) & (t < until_s), _LASTS_S)
+        held = (t >= mission.since_s) & (t < until_s) & during(flight.airborne, t)
+        spans = lasting(t, (height > limit) & by_itself & held, _LASTS_S)
         if spans:
             yield _found(flight, spans[0][0], spans[-1][1], _within(t, height, spans[0][0], spans[-1][1]), highest)
             return
@@ -57,7 +58,7 @@ def _flown(flight: Flight) -> Iterator[tuple[HeldMission, float]]:
     """Every mission that it held, and until when."""
     held = flight.held_missions
     ends = [*(one.since_s for one in held[1:]), np.inf]
-    yield from zip(held, ends, strict=True)
+    yield from zip(held, ends, strict=False)
 
 
 def _highest_m(mission: HeldMission, flight: Flight) -> float | None:
