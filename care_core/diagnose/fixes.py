@@ -210,7 +210,7 @@ def to_fix(query: CounterfactualQuery, assignment: Assignment, probability: floa
             for name in order
         ),
         p_fixed=probability,
-        predicted={name: prediction(query, name, config) for name in query.model.outcomes},
+        predicted={name: as_likely(prediction(query, name, config), probability) for name in query.model.outcomes},
     )
 
 
@@ -219,6 +219,12 @@ def prediction(query: CounterfactualQuery, objective: str, config: Config) -> Pr
     p = query.predict(objective, [config])
     p_ok = float(p.p_ok[0])
     return Prediction(float(p.value[0]), float(p.low[0]), float(p.high[0]), None if np.isnan(p_ok) else p_ok)
+
+
+def as_likely(predicted: Prediction, together: float) -> Prediction:
+    """What is predicted of one objective, which is no less likely to be met than all of them: of these the causes of
+    the failure and the runs that were left out of training tell more than one mechanism."""
+    return predicted if predicted.p_ok is None else replace(predicted, p_ok=max(predicted.p_ok, together))
 
 
 def change_notes(option: Variable) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from care_core.diagnose.estimates import CHANCY, COST, NECESSARY, WORTH
+from care_core.diagnose.fixes import as_likely
 from care_core.diagnose.parts import LATE_S, set_wrong
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Cause, Fault, Fix, Hypothesis, ObjectiveResult
@@ -35,7 +36,12 @@ def promised(fixes: Sequence[Fix], promise: Promise) -> tuple[Fix, ...]:
     configs = [{**driven, **{one.option.name: one.suggested for one in fix.changes}} for fix in fixes]
     odds = map(float, promise.odds(configs))
     return tuple(
-        replace(fix, p_fixed=share, changes=_likeliest_first(fix, promise))
+        replace(
+            fix,
+            p_fixed=share,
+            predicted={name: as_likely(one, share) for name, one in fix.predicted.items()},
+            changes=_likeliest_first(fix, promise),
+        )
         for fix, share in zip(fixes, odds, strict=True)
     )
 
