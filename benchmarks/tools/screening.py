@@ -2,7 +2,7 @@
 
 usage: python -m benchmarks.tools.screening FOLDER VEHICLE REFERENCES
 
-FOLDER: rows.jsonl (tag, name, value, ok) and logs/TAG.BIN; REFERENCES: JSON, each parameter's reference
+FOLDER: rows.jsonl (tag, name, value, ok) and logs/TAG.*, of what was lost at least; REFERENCES: JSON, each parameter's reference
 
 How a flight failed is what `care` itself reads out of its log, by the same words that a run is held against later. A
 flight of which it sees nothing wrong counts as one that was not lost.
@@ -21,9 +21,9 @@ from care_core.diagnose.outside.signs import Signs, signs_of
 from care_core.metadata.screening import TABLE
 
 HEAD = """\
-# Flights of ArduPilot's own simulator with one parameter wrong at a time and all others at their reference, three
+# Flights of the firmware's own simulator with one parameter wrong at a time and all others at their reference, three
 # short missions: Copter 4.5.4 in a light wind (C), Rover 4.5.4 (R), QuadPlane 4.5.4 (P; what was lost in the air was
-# lost twice). Documented values and ends of ranges. `first`: the signs that came first (words of causal_map.py), empty
+# lost twice); one short mission: PX4 1.15.4 quadcopter (X). Documented values and ends of ranges. `first`: the signs that came first (words of causal_map.py), empty
 # where the mission met every limit; `others`: those that followed; `refusals`: what kept it from arming, without its
 # numbers. Written by benchmarks/tools/screening.py.
 name	vehicle	reference	value	first	others	refusals
@@ -43,9 +43,9 @@ def signs(log: Path) -> Signs:
     return signs_of(run, broken, case.diagnosis.health, case.reading.profile.schema, query)
 
 
-def row(flight: dict[str, Any], reference: float, vehicle: str, log: Path) -> str:
+def row(flight: dict[str, Any], reference: float, vehicle: str, log: Path | None) -> str:
     """One line of the table."""
-    seen = Signs(frozenset(), frozenset()) if flight["ok"] else signs(log)
+    seen = Signs(frozenset(), frozenset()) if flight["ok"] or log is None else signs(log)
     cells = (sorted(seen.first), sorted(seen.every - seen.first))
     told = [" ".join(names) for names in cells]
     numbers = [f"{number:.7g}" for number in (reference, flight["value"])]
@@ -55,10 +55,11 @@ def row(flight: dict[str, Any], reference: float, vehicle: str, log: Path) -> st
 def main(folder: Path, vehicle: str, references: Path) -> None:
     flights = [json.loads(line) for line in (folder / "rows.jsonl").read_text().splitlines()]
     known = {name: one["reference"] for name, one in json.loads(references.read_text()).items()}
+    logs = {one.stem: one for one in (folder / "logs").iterdir()}
     lines = [
-        row(flight, known[flight["name"]], vehicle, log)
+        row(flight, known[flight["name"]], vehicle, logs.get(flight["tag"]))
         for flight in sorted(flights, key=lambda one: (one["name"], one["value"]))
-        if (log := folder / "logs" / f"{flight['tag']}.BIN").exists()
+        if flight["ok"] or flight["tag"] in logs
     ]
     others = (line for line in TABLE.read_text().splitlines() if not line.startswith(("#", "name\t")))
     kept = [line for line in others if line.split("\t")[1] != vehicle]

@@ -60,6 +60,8 @@ _SHARE = 0.3
 
 _EXPLAINS = re.compile(r"[A-Z][A-Z0-9]*_[A-Z0-9_]+ is -?\d")
 """What the evidence of a refusal adds of the parameters that its check reads."""
+_LAST = re.compile(r"not ready to fly: (.+)")
+"""The title of PX4's refusals."""
 
 
 class Signs(Record):
@@ -101,8 +103,15 @@ def signs_of(
 
 def _refusals(findings: Iterable[Finding]) -> frozenset[str]:
     refused = [one for one in every_finding(findings) if one.kind == "prearm" and one.severity != "info"]
-    told = (text for one in refused for text in one.evidence.split("; ") if not _EXPLAINS.match(text))
-    return frozenset(map(plain_refusal, told))
+    return frozenset(plain_refusal(text) for one in refused for text in _said(one))
+
+
+def _said(refusal: Finding) -> Iterator[str]:
+    """The words of the checks that refused: of PX4, which complains of much until it is ready, the last ones."""
+    if last := _LAST.match(refusal.title):
+        yield last[1]
+    else:
+        yield from (text for text in refusal.evidence.split("; ") if not _EXPLAINS.match(text))
 
 
 def _of_findings(findings: Iterable[Finding]) -> Iterator[Sign]:
@@ -138,9 +147,9 @@ def _of_shortfall(shortfall: Iterable[str], flies: bool) -> Iterator[Sign]:
     for text in shortfall:
         if text.startswith("it came down"):
             yield "elsewhere"
-        elif re.match(r"0 of \d+ waypoints", text):
+        elif re.match(r"0 of \d+ (waypoints|mission items)", text):
             yield from ("no_takeoff", "stuck") if flies else ("stuck",)
-        elif "waypoints were reached" in text:
+        elif re.search(r"(waypoints|mission items) were reached", text):
             yield "stuck"
 
 

@@ -20,6 +20,7 @@ from care_core.ecosystems.px4.checks import (
     log,
     motor,
     recorded,
+    rotors,
     twist,
     vibration,
 )
@@ -29,6 +30,7 @@ CHECKS: tuple[Check[Px4Flight], ...] = (
     flags.CHECK,
     estimator.CHECK,
     motor.CHECK,
+    rotors.CHECK,
     twist.CHECK,
     lift.CHECK,
     idle.CHECK,

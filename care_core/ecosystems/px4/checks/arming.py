@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
+from care_core.configs.driven import same_value
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.flight import MESSAGES, STATUS, Px4Flight, is_bare_denial, reason_of
+from care_core.ecosystems.px4.preflight import read_by
 from care_core.ecosystems.timeline import counted
 from care_core.logs.base import Wanted
+from care_core.run import Setting, shown
 
 READS: Wanted = {STATUS: ("arming_state",), MESSAGES: ("message",)}
 LIMITS = Limits()
@@ -17,11 +19,8 @@ _SURE = LIMITS.add("probability of what the vehicle says", 0.95, "", "the firmwa
 _UNSAID = LIMITS.add("probability of a parameter where it says nothing", 0.3, "", "a choice: a part is as likely")
 _KEPT = LIMITS.add("probability that no mission is flown so", 1.0, "", "it does not arm")
 
-_READ_BY = (
-    (re.compile(r"geofence violation", re.IGNORECASE), ("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST")),
-    (re.compile(r"first waypoint|too far", re.IGNORECASE), ("MIS_DIST_1WP",)),
-)
-"""Complaints that follow from a parameter which missions are planned by (feasibility_checker, mission_feasibility)."""
+_PLANNED_BY = frozenset(("GF_ACTION", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST", "MIS_DIST_1WP"))
+"""What missions are planned by: a mission beyond it is refused at its default, too."""
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -29,9 +28,10 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         return
     reasons = list(dict.fromkeys(reason_of(text) for _, text in flight.refusals))
     first, last = flight.complaints[0][0], flight.complaints[-1][0]
+    off = {name: setting for reason in reasons for name in read_by(reason) if (setting := _off(name, flight))}
     others = "".join(f"{text}; " for text in reasons[-3:-1])
-    named = tuple(dict.fromkeys(name for reason in reasons for pattern, names in _READ_BY if pattern.search(reason)
-                                for name in names))  # fmt: skip
+    values = "".join(f"; {one.name} is {shown(one.value)} (default {shown(one.default)})" for one in off.values())
+    named = tuple(dict.fromkeys((*off, *(n for reason in reasons for n in read_by(reason) if n in _PLANNED_BY))))
     is_unsaid = all(is_bare_denial(reason) for reason in reasons)
     yield Finding(
         kind="prearm",
@@ -39,13 +39,22 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         onset_s=first,
         end_s=max(last, first),
         severity="critical" if flight.was_denied else "warning",
-        evidence=f"{others}{counted(len(flight.complaints), 'complaint')}, and it never armed",
+        evidence=f"{others}{counted(len(flight.complaints), 'complaint')}, and it never armed{values}",
         source=f"{MESSAGES} of the preflight checks",
         suspect="parameter" if named or is_unsaid else "operation",
         parameters=named,
+        wanted=tuple((name, float(one.default)) for name, one in off.items() if isinstance(one.default, (int, float))),
         probability=_UNSAID if is_unsaid else _SURE,
         mission_lost=_KEPT,
     )
+
+
+def _off(name: str, flight: Px4Flight) -> Setting | None:
+    """A parameter that is not at its airframe's default; None where it is, or the log does not hold both."""
+    setting = next(iter(flight.log.settings().get(name, ())), None)
+    if setting is None or setting.default is None or same_value(setting.default, setting.value):
+        return None
+    return setting
 
 
 CHECK = Check("arming", "preflight checks that kept it from arming", READS, LIMITS, find)

@@ -1,0 +1,90 @@
+"""What PX4's parameters say of rotors, outputs and preflight checks, where it cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+
+from care_core.ecosystems.px4.checks import arming, rotors
+from care_core.ecosystems.px4.flight import MESSAGES, STATUS, Px4Flight
+from care_core.ecosystems.px4.preflight import read_by
+from care_core.run import Setting
+from tests.unit.test_px4_health import FLOWN, MadeLog, states, words
+
+PLACES = ((1.0, 1.0, 0.05), (-1.0, -1.0, 0.05), (1.0, -1.0, -0.05), (-1.0, 1.0, -0.05))
+"""North, east and turn of the rotors of a quad X."""
+
+
+def quad(**changed: float) -> dict[str, tuple[Setting, ...]]:
+    """The parameters of a quad X with their airframe's defaults, some of them changed."""
+    default = {"CA_AIRFRAME": 0.0, "CA_ROTOR_COUNT": 4.0}
+    for n, (north, east, turn) in enumerate(PLACES):
+        fields = {"PX": north, "PY": east, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "KM": turn, "CT": 6.5}
+        default |= {f"CA_ROTOR{n}_{field}": value for field, value in fields.items()}
+        default[f"PWM_MAIN_FUNC{n + 1}"] = 101.0 + n
+    return {name: (Setting(name, changed.get(name, value), "ulog", value),) for name, value in default.items()}
+
+
+def flight(parameters: Mapping[str, tuple[Setting, ...]]) -> Px4Flight:
+    return Px4Flight(MadeLog({STATUS: FLOWN}, parameters=parameters))
+
+
+def test_a_frame_that_balances_says_nothing() -> None:
+    assert not list(rotors.find(flight(quad())))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("CA_ROTOR2_KM", 0.05, "3 rotors that turn one way and 1 the other"),
+        ("CA_ROTOR0_PX", -1.0, "lift off the middle"),
+        ("CA_ROTOR1_CT", -6.5, "lifts nothing, or downwards"),
+        ("CA_ROTOR3_AZ", 1.0, "lift up and down"),
+        ("CA_ROTOR0_AY", 0.5, "one rotor that is tilted"),
+    ],
+)
+def test_a_rotor_that_cannot_be_is_named_with_its_airframes_value(name: str, value: float, says: str) -> None:
+    (found,) = rotors.find(flight(quad(**{name: value})))
+    (default,) = quad()[name]
+    assert (found.parameters, found.wanted) == ((name,), ((name, default.default),))
+    assert says in found.evidence
+
+
+def test_what_an_airframe_is_shipped_with_is_not_doubted() -> None:
+    odd = {name: (Setting(name, 0.05, "ulog", 0.05),) for name in ("CA_ROTOR2_KM", "CA_ROTOR3_KM")}
+    assert not list(rotors.find(flight(quad() | odd)))
+
+
+def test_a_motor_that_no_output_drives_is_named() -> None:
+    (found,) = rotors.find(flight(quad(PWM_MAIN_FUNC3=0.0)))
+    assert (found.title, found.wanted) == ("no output drives motor 3", (("PWM_MAIN_FUNC3", 103.0),))
+
+
+def test_a_check_that_refuses_names_what_it_reads_where_that_is_off() -> None:
+    said = words(
+        (5.0, "critical", "Preflight Fail: Parachute system missing"),
+        (6.0, "critical", "Arming denied: Resolve system health failures first"),
+    )
+    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
+    off = {"COM_PARACHUTE": (Setting("COM_PARACHUTE", 1.0, "ulog", 0.0),)}
+    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=off)))
+    assert (found.parameters, found.wanted) == (("COM_PARACHUTE",), (("COM_PARACHUTE", 0.0),))
+    assert "COM_PARACHUTE is 1 (default 0)" in found.evidence
+    as_shipped = {"COM_PARACHUTE": (Setting("COM_PARACHUTE", 1.0, "ulog", 1.0),)}
+    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=as_shipped)))
+    assert (found.parameters, found.suspect) == ((), "operation")
+
+
+@pytest.mark.parametrize(
+    ("says", "reads"),
+    [
+        ("ESC telemetry missing", "COM_ARM_CHK_ESCS"),
+        ("Found 1 compass (required: 4)", "SYS_HAS_MAG"),
+        ("barometer 0 missing", "SYS_HAS_BARO"),
+        ("Not enough GPS Satellites", "EKF2_REQ_NSATS"),
+        ("Vehicle is in safety configuration", "COM_ARMABLE"),
+    ],
+)
+def test_a_refusal_is_known_by_its_words(says: str, reads: str) -> None:
+    assert reads in read_by(says)
