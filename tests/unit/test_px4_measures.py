@@ -157,6 +157,16 @@ def test_a_mission_is_whole_once_its_last_item_was_reached_whatever_has_no_place
     assert value("px4_mission_success", mission(mission_result=result, navigator_mission_item=held)) == success
 
 
+@pytest.mark.parametrize(("third_s", "success"), [(84.5, 1.0), (60.0, 0.0)])
+def test_a_last_item_that_is_the_return_counts_in_a_log_that_names_no_items(third_s: float, success: float) -> None:
+    rows = [(5.0, -1.0), (20.0, 0.0), (40.0, 1.0), (third_s, 2.0), (132.0, -1.0)]
+    names = ("seq_reached", "seq_total", "finished", "failure", "mission_id", "instance_count")
+    result = table([(t, n, 4.0, 0.0, 0.0, 1.0, 1.0) for t, n in rows], *names)
+    unnamed = mission(mission_result=result, navigator_mission_item=flown()["navigator_mission_item"].between(0.0, 0.0))
+    assert value("px4_mission_success", unnamed) == success
+    assert value("px4_mission_broken_off", unnamed) == 1.0 - success
+
+
 def test_a_failsafe_and_where_it_landed_count() -> None:
     status = {**flown()["vehicle_status"].columns, "failsafe": steps((0, 0), (100, 1))}
     flags = Table(AT, {"battery_warning": steps((0, 0), (100, 2)), "geofence_breached": steps((0, 0))})

@@ -6,6 +6,7 @@ the mode is Mission is about a mission.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -30,7 +31,7 @@ def mission_outcome(flight: Px4Flight, span: Span) -> Value:
     if replaced_s is not None:
         reason = f"the mission was replaced under way, at {log_time(replaced_s, 0)}"
         return Unavailable(reason, "judge a run whose mission stays as it was uploaded")
-    if any(flight.ever(RESULT, "finished", 1, part) or _returned_from_last_item(flight, span, part) for part in flown):
+    if any(flight.ever(RESULT, "finished", 1, part) for part in flown) or did_last_item(flight, span):
         return 1.0
     mode = mode_name("px4", flight.modes_during(span)[-1])
     return Unavailable(f"the mission was not flown to its end, the last mode was {mode}")
@@ -74,9 +75,13 @@ def _flown(flight: Px4Flight, span: Span) -> Iterator[Span]:
             yield max(start, span[0]), end + SAID_WITHIN_S
 
 
-def _returned_from_last_item(flight: Px4Flight, span: Span, flown: Span) -> bool:
+def did_last_item(flight: Px4Flight, span: Span) -> bool:
     """Whether all items were reached, or all but a last one that is the return or the landing itself, on which it left
     the mission at once, and it landed. Disarming resets what the navigator says."""
+    return any(_did_last_item(flight, span, part) for part in _flown(flight, span))
+
+
+def _did_last_item(flight: Px4Flight, span: Span, flown: Span) -> bool:
     rows = flight.table(RESULT, "seq_reached", "seq_total")
     part = None if rows is None else rows.between(*flown)
     if part is None or not len(part):
@@ -87,5 +92,6 @@ def _returned_from_last_item(flight: Px4Flight, span: Span, flown: Span) -> bool
     after = [(t, mode) for t, mode in flight.modes if flown[0] < t <= span[1]]
     goes_home = bool(after) and way_of("px4", after[0][1]) in ("return", "land")
     one_left = part.t[(left == 1) & (part["seq_total"] > 1)]
-    at_once = goes_home and len(one_left) > 0 and abs(after[0][0] - float(one_left[0])) <= 2 * SAID_WITHIN_S
+    waited_s = after[0][0] - float(one_left[0]) if goes_home and len(one_left) else math.inf
+    at_once = -SAID_WITHIN_S / 2 <= waited_s <= 2 * SAID_WITHIN_S  # the mode is told twice a second
     return at_once and flight.last(LANDED, "landed", span[1]) == 1

@@ -12,6 +12,7 @@ import numpy as np
 
 from care_core.ecosystems.measures import Mission, has, numeric, one_of
 from care_core.ecosystems.px4.flight import LANDED, POSITION, READS, RESULT, Px4Flight
+from care_core.ecosystems.px4.flown_mission import did_last_item
 from care_core.ecosystems.px4.measures.requested import (
     ITEMS,
     LAND,
@@ -63,11 +64,15 @@ class FlownMission(Record, eq=False):
     legs: Phase | None
     """From the start of the first leg to where the last one was flown, or broken off; None where none was begun."""
     phases: Mapping[tuple[str, int], Phase]
+    did_last_item: bool
+    """Whether its last item was reached, or was the return or the landing that it left the mission for, and landed."""
 
     @property
     def all_reached(self) -> bool:
         """Whether every waypoint was reached: what follows them is the return or the landing, or nothing. A mission
         whose last item was reached is whole, whatever of it has no place (a delay, a gripper)."""
+        if self.did_last_item:
+            return True
         if self.items is not None and self.reached >= self.items - 1 >= 0:
             return True
         return bool(self.places) and self.reached >= max(self.places) and self.has_all_places
@@ -138,6 +143,7 @@ def analyse(mission: Mission) -> FlownMission:
         track=track,
         legs=_legs(mission, items, places, reached),
         phases=phases,
+        did_last_item=did_last_item(flight_of(mission), (mission.start_s, mission.end_s)),
     )
 
 
