@@ -13,12 +13,13 @@ T = np.arange(0.0, 60.0, 0.1)
 TURN_DPS = 3.0 * np.sin(T)
 
 
-def read(rate: float, output: float, *, with_gyros: bool = True) -> tuple[float, float]:
+def read(rate: float, output: float, *, with_gyros: bool = True, firmware: str = "") -> tuple[float, float]:
     """The largest rate and output of a log whose firmware writes so many units for a degree a second and for all."""
     tables = {"RATE": Table(T, {"R": rate * TURN_DPS, "RDes": rate * TURN_DPS, "ROut": output * TURN_DPS / 300})}
     if with_gyros:
         tables["IMU"] = Table(T, {"GyrX": np.radians(TURN_DPS), "GyrY": np.zeros(len(T))})
-    made = in_degrees(TablesLog(tables, 60.0)).read({"RATE": ("R", "RDes", "ROut")})["RATE"]
+    log = TablesLog(tables, 60.0, facts={"firmware": firmware})
+    made = in_degrees(log).read({"RATE": ("R", "RDes", "ROut")})["RATE"]
     assert made["RDes"].max() == made["R"].max()
     return float(made["R"].max()), float(made["ROut"].max())
 
@@ -35,6 +36,18 @@ def test_a_rate_that_the_gyros_say_as_well_is_one_in_degrees() -> None:
 
 def test_a_controller_that_asks_for_more_than_there_is_writes_no_other_unit() -> None:
     assert read(1.0, 2200.0) == pytest.approx((3.0, 22.0), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("firmware", "rate", "output"),
+    [
+        ("APM:Copter V3.4-dev (abcdef12)", 100.0, 9000.0),
+        ("APM:Copter V3.4 (abcdef12)", 1.0, 1.0),
+        ("APM:Copter V3.5.7 (abcdef12)", 1.0, 1.0),
+    ],
+)
+def test_early_builds_of_a_release_may_write_the_old_unit(firmware: str, rate: float, output: float) -> None:
+    assert read(rate, output, firmware=firmware)[0] == pytest.approx(3.0, rel=1e-3)
 
 
 def test_other_messages_are_left_alone() -> None:

@@ -23,8 +23,8 @@ _GYROS: Wanted = {"IMU": ("GyrX", "GyrY")}
 _CENTI, _OUTPUT = 0.01, 1 / 4500
 _OVER = 50.0
 """An output so far beyond all that the motors have, 1, is one of 4500: a copter that tumbles asks for 22."""
-_IN_DEGREES = (3, 4)
-"""The first release of ArduCopter that writes degrees."""
+_IN_DEGREES = (3, 5)
+"""The first release of ArduCopter of which every build writes degrees: those of 3.4-dev began with hundredths."""
 _FROM, _TO = 30.0, 300.0
 """By what factor hundredths of a degree are more than degrees: the gyro's spread and the rate's differ by less."""
 
