@@ -229,6 +229,13 @@ def test_an_error_that_a_fatal_one_follows_leads_it(tmp_path: Path) -> None:
     assert [one.kind for one in health.findings[0].consequences] == ["software"]
 
 
+@pytest.mark.parametrize(("node", "told"), [("/rviz_1537544825", 0), ("/robot/rqt_gui", 0), ("/driver", 1)])
+def test_what_fails_in_a_display_fails_nothing_of_the_robot(tmp_path: Path, node: str, told: int) -> None:
+    health = looked_at(Drive(said=[(5.0, ERROR, node, "poll failed with error Interrupted system call")]), tmp_path)
+    assert len([one for one in health.findings if node in one.title]) == told
+    assert any(node in one.text for one in health.timeline)
+
+
 def test_recordings_that_tell_of_no_robot_say_so(tmp_path: Path) -> None:
     write_mcap(tmp_path / "imu.mcap")
     health = ECOSYSTEM.examine(run_model(open_log(tmp_path / "imu.mcap")))

@@ -21,6 +21,8 @@ _HARMLESS = re.compile(
     r"transition callback on a goal handle that we're not tracking|rotate recovery can't rotate", re.IGNORECASE
 )
 """Known of actionlib (a client that sends goals fast), and of the recovery behaviours, whose failing others tell."""
+_TOOL = re.compile(r"(^|/)(rviz|rqt_|plotjuggler|foxglove)", re.IGNORECASE)
+"""Nodes that show an operator what a robot does: what fails in them fails nothing of the robot."""
 _ABOUT: tuple[tuple[re.Pattern[str], FindingKind], ...] = (
     (re.compile(r"lidar|laser|scan|velodyne|hokuyo|sick|ouster|rplidar", re.IGNORECASE), "laser"),
     (re.compile(r"battery|voltage|charg", re.IGNORECASE), "battery"),
@@ -82,12 +84,13 @@ def reported(report: Report) -> str:
 
 def _errors(drive: Drive) -> Iterator[Finding]:
     kinds: dict[tuple[str, str], list[LogMessage]] = {}
-    for message in drive.log_messages:
+    messages = [message for message in drive.log_messages if not _TOOL.search(message.node)]
+    for message in messages:
         text = message.text
         is_known = FAILS.search(text) or is_late(text) or _HARMLESS.search(text)
         if message.level >= Level.ERROR and not is_known:
             kinds.setdefault((message.node, _NUMBER.sub("#", text)), []).append(message)
-    fatal_s = max((message.time_s for message in drive.log_messages if message.level >= Level.FATAL), default=None)
+    fatal_s = max((message.time_s for message in messages if message.level >= Level.FATAL), default=None)
     ranked = sorted(kinds.values(), key=lambda alike: (-alike[0].level, alike[0].time_s))
     for alike in ranked[:MOST]:
         first = alike[0]
