@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -331,6 +333,15 @@ def test_a_compass_that_goes_off(rate_hz: float) -> None:
     assert (finding.kind, finding.title, finding.severity) == ("compass", "compass 1 is disturbed", "critical")
     assert finding.evidence.startswith("the difference of compasses 1 and 2 changes by 2")  # what is over its limit
     assert finding.onset_s == pytest.approx(FAILS_S, abs=3.0)
+
+
+def test_a_difference_of_compasses_is_told_by_what_exceeds_its_limit() -> None:
+    made = Made()
+    made.table["MAG"]["MagX"][made.after(FAILS_S)] += np.where(np.sin(made.t[made.after(FAILS_S)] / 2) > 0.6, 190, 120)
+    finding = first(made)
+    found = re.search(r"changes by (\d+) mGauss in flight \(limit (\d+)\)", finding.evidence)
+    assert found is not None
+    assert int(found[1]) > int(found[2])
 
 
 def test_compasses_that_differ_in_flips_alone_are_sound() -> None:

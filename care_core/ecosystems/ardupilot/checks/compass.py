@@ -160,8 +160,9 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         start, end = spans[0][0], spans[-1][1]
         inside = (t >= start) & (t <= end)
         ratio = float(median(over[inside]))
-        has_moved = float(median(moved[inside])) / MOVED > float(median(level[inside])) / APART
-        size = float(median((moved if has_moved else level)[inside]))
+        beyond = inside & (over > 1.0)
+        has_moved = float(median(moved[beyond])) / MOVED > float(median(level[beyond])) / APART
+        size = float(median((moved if has_moved else level)[beyond]))
         worse = _odd_one(compasses, n)
         yield Finding(
             kind="compass",
