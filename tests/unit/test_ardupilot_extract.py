@@ -234,6 +234,18 @@ def test_a_missed_waypoint_and_a_landing_elsewhere_fail() -> None:
     assert value(moved, "mission_success") == 0.0
 
 
+@pytest.mark.parametrize(
+    ("firmware", "wait_s", "success"),
+    [("APM:Copter V3.5.7", 0.0, 1.0), ("APM:Copter V3.5.7", 5.0, 0.0), ("ArduCopter V4.5.4", 0.0, 0.0)],
+)
+def test_a_copter_on_its_leash_lands_short_of_its_last_waypoint(firmware: str, wait_s: float, success: float) -> None:
+    rows = [(1, 22, 0.0, 0.0, 20.0, 0.0), (2, 16, north(8), HOME[1], 20.0, wait_s), (3, 21, 0.0, 0.0, 0.0, 0.0)]
+    items = table([(0.0, *row) for row in rows], "CNum", "CId", "Lat", "Lng", "Alt", "Prm1")
+    mission = only({**flight(), "CMD": items}, firmware)
+    assert value(mission, "landing_error") == pytest.approx(8.0)
+    assert value(mission, "mission_success") == success
+
+
 def test_a_log_that_ends_in_flight_has_no_success() -> None:
     mission = only(flight(ARM=table([(10.0, 1, 0)], "ArmState", "Forced")))
     assert not mission.ended

@@ -24,7 +24,7 @@ from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, fl
 from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.ardupilot.measures.route import landing_error
 from care_core.ecosystems.ardupilot.measures.samples import lost_events, samples
-from care_core.ecosystems.ardupilot.measures.shortfall import event_clause, short_of, tolerance_m
+from care_core.ecosystems.ardupilot.measures.shortfall import event_clause, landing_tolerance_m, short_of
 from care_core.ecosystems.coverage import SUM, doubt
 from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
@@ -268,4 +268,4 @@ def _mission_flown(mission: Mission) -> Value:
     off_m = landing_error(mission, {})
     if not is_known(off_m):
         return off_m
-    return float(off_m <= tolerance_m(mission))
+    return float(off_m <= landing_tolerance_m(mission))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,10 @@ _MOST_ITEMS = 2000
 """Items that are followed: a jump without end would never stop."""
 _CIRCLE_RATE, _AIRSPEED_MS = 20.0, 12.0
 """As shipped (AC_Circle.h, ArduPlane/config.h)."""
+_STOPS = (4, 1)
+"""The first ArduCopter that is at a waypoint before it goes on to what is no waypoint (SCurve)."""
+_SPEED_CMS, _ACCELERATION_CMSS, _POSITION_GAIN = 500.0, 100.0, 1.0
+"""As shipped before (AC_WPNav.h, AC_PosControl.h)."""
 _HOME = 1
 """Type of an ORGN record: home; 0 is the origin of the estimator."""
 
@@ -116,6 +121,29 @@ def _last_place(
     if item.command == RETURN:
         return (0.0, 0.0, 0.0) if drives else None
     return (*offset_m(home, item.lat, item.lng), before[2]) if item.lat or item.lng else None
+
+
+def trails_m(mission: Mission) -> float:
+    """How far behind its last waypoint a copter may be when it begins to land wherever it is then.
+
+    Before 4.1 a waypoint without a wait counts as reached when the point that leads the copter is there, and it follows
+    by up to its leash (AC_WPNav::advance_wp_target_along_track, AC_PosControl::calc_leash_length).
+    """
+    flight, held = flight_of(mission), mission.shared(mission_held)
+    version = flight.vehicle.version
+    if isinstance(held, Unavailable) or not flight.is_copter or version is None or version[:2] >= _STOPS:
+        return 0.0
+    leading = [item for item in _followed(held.items) if item.command in (*PLACES, RETURN, LAND)]
+    way = list(takewhile(lambda item: item.command in PLACES, leading))
+    last = leading[len(way)] if len(way) < len(leading) else None
+    if not way or way[-1].first > 0 or last is None or last.command != LAND or last.lat or last.lng:
+        return 0.0
+    speed = number_set(mission, "WPNAV_SPEED", _SPEED_CMS) / 100
+    acceleration = max(number_set(mission, "WPNAV_ACCEL", _ACCELERATION_CMSS) / 100, 0.1)
+    gain = max(number_set(mission, "PSC_POSXY_P", number_set(mission, "POS_XY_P", _POSITION_GAIN)), 0.1)
+    if speed <= acceleration / gain:
+        return speed / gain
+    return acceleration / (2 * gain**2) + speed**2 / (2 * acceleration)
 
 
 def _wait_s(item: Item, circle_s: float, airspeed_ms: float) -> float:

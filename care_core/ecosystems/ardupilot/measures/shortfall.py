@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from care_core.ecosystems.ardupilot.measures.events import crash_of, errors, forced, refused_for, telling
 from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
+from care_core.ecosystems.ardupilot.measures.requested import trails_m
 from care_core.ecosystems.ardupilot.measures.route import landing_error
 from care_core.ecosystems.measures import Mission
 from care_core.ecosystems.vehicles import error_kind as kind_of_error
@@ -36,7 +37,7 @@ def _clauses(mission: Mission) -> Iterator[str]:
         yield short_of(mission)
     else:
         off_m = landing_error(mission, {})
-        if is_known(off_m) and off_m > tolerance_m(mission):
+        if is_known(off_m) and off_m > landing_tolerance_m(mission):
             yield f"it came down {off_m:.0f} m from where the mission ends"
         elif flown.drive is not None and not flown.completed:
             yield "it did not say that its mission is complete"
@@ -47,8 +48,13 @@ def _clauses(mission: Mission) -> Iterator[str]:
 
 
 def tolerance_m(mission: Mission) -> float:
-    """How far from where the mission ends a landing may be."""
+    """How far a waypoint may be off."""
     return float(mission.spec.get("tolerance_m", WAYPOINT_TOLERANCE_M))
+
+
+def landing_tolerance_m(mission: Mission) -> float:
+    """How far from where the mission ends a landing may be."""
+    return tolerance_m(mission) + trails_m(mission)
 
 
 def short_of(mission: Mission) -> str:
