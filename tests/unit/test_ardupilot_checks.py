@@ -987,6 +987,18 @@ def test_a_submarine_that_fights_to_hold_still_lacks_a_thruster(output: str, nam
     assert found.kind == "motor"
 
 
+def test_motor_detection_that_fails_is_told_by_its_thruster() -> None:
+    dive = Made()
+    dive.facts = {"firmware": "ArduSub V4.7.0"}
+    dive.rows["MSG"] += [
+        (FAILS_S, {"Message": "Bad thrust read, trying to push the other way..."}),
+        (FAILS_S + 2, {"Message": "Failed! Please check Thruster 3 and frame setup!"}),
+    ]
+    (found,) = [one for one in every_finding(dive.find()) if "thruster" in one.title]
+    assert (found.title, found.kind, found.severity) == ("motor detection fails at thruster 3", "motor", "warning")
+    assert found.onset_s == FAILS_S + 2
+
+
 def test_the_noise_of_a_monitor_is_no_cell_more() -> None:
     made = Made()
     made.settings.pop("MOT_BAT_VOLT_MAX")

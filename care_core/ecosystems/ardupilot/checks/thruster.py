@@ -6,6 +6,7 @@ controllers; one that lacks a thruster turns with every push of its partner, and
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -34,9 +35,35 @@ _OVER_S = LIMITS.add("time over which the output is averaged", 5.0, "s", "a choi
 _LASTS_S = LIMITS.add("shortest time of holding", 8.0, "s", "a choice: a current pushes for a while")
 _FAILED = LIMITS.add("probability of a thruster", 0.75, "", "a choice: an uneven load or a tether pulls as well")
 _LOST = LIMITS.add("probability that it costs the mission", 0.5, "", "5 of 11 such dives")
+_NOT_DETECTED = re.compile(r"Failed! Please check Thruster (\d+) and frame setup!")
+"""What motor detection says of a thruster that turns the vehicle neither way as its frame would (ArduSub:
+mode_motordetect.cpp)."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
+    """A thruster that is fought against, and one that motor detection could not make out."""
+    yield from _undetected(flight)
+    yield from _fought(flight)
+
+
+def _undetected(flight: Flight) -> Iterator[Finding]:
+    said = [(t, match) for t, text in flight.messages if (match := _NOT_DETECTED.match(text))]
+    for t, match in said[:1]:
+        yield Finding(
+            kind="motor",
+            title=f"motor detection fails at thruster {match[1]}",
+            onset_s=t,
+            end_s=said[-1][0],
+            severity="warning",
+            evidence="it turns the vehicle neither way as its place in the frame would (check wiring, direction "
+            f"and FRAME_CONFIG); the firmware says: {match[0]}",
+            source="MSG",
+            probability=_FAILED,
+            mission_lost=_LOST,
+        )
+
+
+def _fought(flight: Flight) -> Iterator[Finding]:
     """The axis that needs the most; a thruster that lifts shows in the roll, one that pushes in the heading."""
     table, asked = flight.one("RATE", "ROut", "YOut"), flight.one("ATT", "DesRoll", "DesYaw")
     if flight.kind != "sub" or table is None or asked is None or len(asked) < 3:
