@@ -316,6 +316,12 @@ def test_few_satellites() -> None:
     assert finding.onset_s == pytest.approx(FAILS_S, abs=0.2)
 
 
+def test_a_receiver_with_a_fix_that_counts_no_satellites_sees_enough() -> None:
+    made = Made()
+    made.table["GPS"]["NSats"][:] = 0
+    assert made.find() == ()
+
+
 def test_a_fix_lost_in_the_air_counts_and_one_lost_before_arming_does_not() -> None:
     made = Made()
     made.table["GPS"]["Status"][made.after(0.0, 3.0)] = 0

@@ -239,7 +239,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
         return
     usual = quantile(flight.one("GPS", "NSats")["NSats"], 0.9)  # type: ignore[index]
     few = lasting(t, sats < FEWEST, _FEW_S) or lasting(t, (sats <= FEWEST) & (sats <= usual - FALL), _FEW_S)
-    if few:
+    if few and usual > 0:  # one that has a fix and never saw a satellite does not count them
         start, end = few[0][0], few[-1][1]
         least = float(np.min(sats[(t >= start) & (t <= end)]))
         harmed = _harmed(flight, start)
