@@ -14,7 +14,7 @@ from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, c
 from care_core.ecosystems.plausible import clock_doubt, dead_sources
 from care_core.ecosystems.registry import ecosystem_of, register_measures
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
-from care_core.logs.base import merge_needs
+from care_core.logs.base import Log, merge_needs
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.formats import format_named
 from care_core.logs.identity import recording_of
@@ -154,7 +154,7 @@ class _Source(Record, eq=False):
                 where=str(log.path),
             )
         dictionary = ecosystem_of(log.format).messages()
-        doubts = tuple(_doubt(log.facts, clock_doubt(dictionary, tables, one.start_s, one.end_s)) for one in missions)
+        doubts = tuple(_doubt(log, clock_doubt(dictionary, tables, one.start_s, one.end_s)) for one in missions)
         return cls(
             schema, kind, log_info(model, sha256()), settings, missions, dead_sources(dictionary, tables), doubts
         )
@@ -238,16 +238,15 @@ class _Source(Record, eq=False):
 
 _REQUESTED = ("mission_asked", "goals_asked")
 """Extractors of what a mission asks for."""
-_CLOCK_ADVICE = "judge a log whose messages carry the time at which they were recorded"
 _LOOK = "look at its source with 'care inspect'"
 
 
-def _doubt(facts: Mapping[str, str], clock: str) -> Unavailable | None:
+def _doubt(log: Log, clock: str) -> Unavailable | None:
     """Why nothing of a mission can be told, None where it can."""
-    if shared := facts.get("shared id"):
+    if shared := log.facts.get("shared id"):
         hint = "give each vehicle a system id of its own, and record again"
         return Unavailable(f"two vehicles speak under one system id: {shared}", hint)
-    return Unavailable(clock, _CLOCK_ADVICE) if clock else None
+    return Unavailable(clock, log.format.clock_hint) if clock else None
 
 
 def _changes(settings: Mapping[str, tuple[Setting, ...]], mission: Mission) -> dict[str, tuple[Setting, ...]]:

@@ -36,6 +36,8 @@ class LogFormat(Record):
     """Whether the reader unpacks zstd by itself."""
     missing_hint: str = ""
     """What to do about a channel that a log of this format lacks; empty: what its ecosystem says."""
+    clock_hint: str = "judge a log whose messages carry the time at which they were recorded"
+    """What to do about times that cannot be right."""
 
 
 def is_raw_mavlink(head: bytes) -> bool:
@@ -109,6 +111,8 @@ MAVLINK_TLOG = LogFormat(
     suffixes=(".tlog",),
     looks_like=_is_mavlink,
     missing_hint="telemetry does not carry it: use the .BIN (PX4: the .ulg) of the vehicle's memory card",
+    clock_hint="telemetry has the ground station's times, and a simulator runs at its own pace: use the .BIN (PX4: the"
+    " .ulg) that the vehicle wrote",
 )
 PX4_ULG = LogFormat(
     name="px4-ulg",

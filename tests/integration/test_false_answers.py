@@ -130,6 +130,13 @@ def test_a_clock_that_is_not_the_satellites(care: Care, tmp_path: Path, source: 
     assert "satellites" in objectives["mission_time"]["reason"]
 
 
+@pytest.mark.parametrize(("kind", "advice"), [("tlog", "that the vehicle wrote"), ("BIN", "messages carry the time")])
+def test_a_wrong_clock_of_telemetry_is_the_ground_stations(care: Care, tmp_path: Path, kind: str, advice: str) -> None:
+    path = restamped.written(tmp_path, GOOD, restamped.CLOCKS["standing still half the time"], kind)
+    _, out, _ = care("triage", path, "--profile", "arducopter")
+    assert advice in " ".join(out.split("\n\n")[0].split())
+
+
 def test_energy_is_integrated_where_the_counter_is_no_number(care: Care, tmp_path: Path) -> None:
     path = tmp_path / "a.BIN"
     path.write_bytes(restamped.dataflash_with(GOOD, "BAT", EnrgTot=math.nan))
