@@ -23,9 +23,9 @@ from care_core.metadata.screening import TABLE
 HEAD = """\
 # Flights of the firmware's own simulator with one parameter wrong at a time and all others at their reference, three
 # short missions: Copter 4.5.4 in a light wind (C), Rover 4.5.4 (R), QuadPlane 4.5.4 (P; what was lost in the air was
-# lost twice); one short mission: PX4 1.15.4 quadcopter (X). Documented values and ends of ranges. `first`: the signs that came first (words of causal_map.py), empty
-# where the mission met every limit; `others`: those that followed; `refusals`: what kept it from arming, without its
-# numbers. Written by benchmarks/tools/screening.py.
+# lost twice); one short mission: PX4 1.15.4, a quadcopter (X). Documented values and ends of ranges. `first`: the signs
+# that came first (words of causal_map.py), empty where the mission met every limit; `others`: those that followed;
+# `refusals`: what kept it from arming, without its numbers. Written by benchmarks/tools/screening.py.
 name	vehicle	reference	value	first	others	refusals
 """
 
