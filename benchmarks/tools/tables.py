@@ -24,7 +24,7 @@ from care_tui.cli import command_line
 from care_tui.manual import EXIT_STATUS, first_sentence
 
 PROFILES = Path(__file__).parents[2] / "profiles"
-SCREENED = {"arducopter": "copter", "ardurover": "rover", "quadplane": "quadplane"}
+SCREENED = {"arducopter": "copter", "ardurover": "rover", "px4": "px4", "quadplane": "quadplane"}
 """The kind of vehicle of each profile whose vehicles' other parameters were screened."""
 MOST_PARTS = 16
 _TABLE = re.compile(r"<!-- table: (?P<name>[\w ]+) -->\n.*?<!-- end of table -->", re.DOTALL)
