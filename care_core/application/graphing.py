@@ -9,11 +9,11 @@ from care_core.application.case import Case, Progress, Request, open_case
 from care_core.errors import ProfileError
 from care_core.files import PROFILE_FILE, profile_folders
 from care_core.profile.store import load_profile
-from care_core.report.graph import GraphDocument, graph_document, graph_json
+from care_core.report.graph import GraphDocument, graph_document
 from care_core.report.graph_files import graph_dot, graph_graphml
 
 FORMATS: Mapping[str, tuple[Callable[[GraphDocument], str], tuple[str, ...]]] = {
-    "json": (graph_json, (".json",)),
+    "json": (GraphDocument.to_json, (".json",)),
     "dot": (graph_dot, (".dot", ".gv")),
     "graphml": (graph_graphml, (".graphml",)),
 }

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from care_core.errors import UsageError, nearest
 from care_core.records import Record
-from care_core.report.watching import NO_ROBOT, WatchEntry, entry_json
+from care_core.report.watching import NO_ROBOT, WatchEntry
 from care_core.starting import program_path
 
 PLACES = ("log", "name", "verdict", "robot", "says", "profile", "sha256", "number")
@@ -50,7 +50,7 @@ class Notifier(Record):
         except (OSError, ValueError) as err:
             return f"The command '{command[0]}' cannot be started: {getattr(err, 'strerror', None) or err}."
         try:
-            _, said = process.communicate(entry_json(entry).encode(), timeout=self.limit_s)
+            _, said = process.communicate(entry.to_json(indent=None).encode(), timeout=self.limit_s)
         except subprocess.TimeoutExpired:
             return f"The command '{command[0]}' took longer than {self.limit_s:g} s and was ended."
         finally:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.diagnose.baseline import Baseline, Proposal, Refused, over
 from care_core.diagnose.tolerance import CONFIDENCE, CONTENT
@@ -86,11 +86,6 @@ class BaselineDocument(Document, kw_only=True):
     limits: list[ProposalEntry]
 
 
-def baseline_schema() -> dict[str, Any]:
-    """The JSON Schema of the baseline document."""
-    return BaselineDocument.json_schema()
-
-
 def baseline_document(found: Baseline) -> BaselineDocument:
     """The proposals as a document."""
     return BaselineDocument(
@@ -140,11 +135,6 @@ def _proposal(one: Proposal) -> ProposalEntry:
 
 def _short(value: float) -> float:
     return float(f"{value:.6g}")
-
-
-def baseline_json(found: Baseline) -> str:
-    """The document, one object."""
-    return baseline_document(found).to_json()
 
 
 def baseline_text(found: Baseline) -> str:

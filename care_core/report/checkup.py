@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.records import field
 from care_core.report.published import Document
@@ -31,21 +31,11 @@ class DoctorDocument(Document, kw_only=True):
     checks: list[CheckEntry]
 
 
-def doctor_schema() -> dict[str, Any]:
-    """The JSON Schema of the check-up."""
-    return DoctorDocument.json_schema()
-
-
 def doctor_document(version: str, checks: Sequence[CheckEntry]) -> DoctorDocument:
     """The document of what was looked at."""
     statuses = {check.status for check in checks}
     worst: Literal["ok", "warn", "fail"] = "fail" if "fail" in statuses else "warn" if "warn" in statuses else "ok"
     return DoctorDocument(version=version, status=worst, checks=list(checks))
-
-
-def doctor_json(document: DoctorDocument) -> str:
-    """The document, one object."""
-    return document.to_json()
 
 
 def doctor_text(document: DoctorDocument) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.records import field
 from care_core.report.published import Document
@@ -65,16 +65,6 @@ class CollectDocument(Document, kw_only=True):
     left_out: list[LeftOutOption]
     limits: list[str]
     runs: list[CollectedRun]
-
-
-def collect_schema() -> dict[str, Any]:
-    """The JSON Schema of a campaign's document."""
-    return CollectDocument.json_schema()
-
-
-def collect_json(document: CollectDocument) -> str:
-    """The document, one object."""
-    return document.to_json()
 
 
 def collect_text(document: CollectDocument) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.diagnose.comparison import Comparison, Departure, EventPair, start_s
 from care_core.diagnose.records import Diagnosis
@@ -99,11 +99,6 @@ class CompareDocument(Document, kw_only=True):
     measures: list[MeasurePairEntry]
     """The most different first."""
     findings: list[FindingPairEntry]
-
-
-def compare_schema() -> dict[str, Any]:
-    """The JSON Schema of the comparison."""
-    return CompareDocument.json_schema()
 
 
 def compare_document(found: Comparison) -> CompareDocument:
@@ -302,14 +297,9 @@ def _line(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def comparison_json(document: CompareDocument) -> str:
-    """One object."""
-    return document.to_json()
-
-
 WRITERS: dict[str, Callable[[CompareDocument], str]] = {
     "text": comparison_text,
-    "json": comparison_json,
+    "json": CompareDocument.to_json,
     "markdown": comparison_markdown,
 }
 """The formats that need nothing drawn."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.driven import parameter_value
@@ -339,11 +339,6 @@ class Report(TriageDocument, kw_only=True):
     verdict: Verdict
     diff: str
     apply: list[str]
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of the triage document."""
-    return TriageDocument.json_schema()
 
 
 def build_document(diagnosis: Diagnosis) -> Report:

@@ -161,11 +161,6 @@ class FleetDocument(Document, kw_only=True):
     suggestions: list[SuggestionEntry]
 
 
-def fleet_schema() -> dict[str, Any]:
-    """The JSON Schema of the fleet."""
-    return FleetDocument.json_schema()
-
-
 def fleet_document(fleet: Fleet) -> FleetDocument:
     """The fleet as a document."""
     return FleetDocument(
@@ -173,11 +168,6 @@ def fleet_document(fleet: Fleet) -> FleetDocument:
         shared=[_pattern_entry(one) for one in fleet.shared],
         suggestions=[_suggestion_entry(one) for one in fleet.suggestions],
     )
-
-
-def fleet_json(fleet: Fleet) -> str:
-    """The document, one object."""
-    return fleet_document(fleet).to_json()
 
 
 def _row_entries(rows: Sequence[Row]) -> list[RowEntry]:

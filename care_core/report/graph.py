@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.causal.effects import Direction
 from care_core.causal.model import EdgeRecord, PathRecord
@@ -73,16 +73,6 @@ class GraphDocument(Document, kw_only=True):
     def has_on_path(self, edge: EdgeEntry) -> bool:
         """Whether the run's cause leads over an edge."""
         return edge.kind == "directed" and (edge.source, edge.target) in pairwise(self.cause)
-
-
-def graph_schema() -> dict[str, Any]:
-    """The JSON Schema of the graph."""
-    return GraphDocument.json_schema()
-
-
-def graph_json(document: GraphDocument) -> str:
-    """The document, one object."""
-    return document.to_json()
 
 
 def graph_document(profile: Profile, cause: Sequence[str] = ()) -> GraphDocument:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.diagnose.verdict import beside, fit_words
 from care_core.history.store import HistoryError, Triaged, Verified
@@ -114,11 +114,6 @@ class HistoryDocument(Document, kw_only=True):
     verified: PromiseRecord
 
 
-def history_schema() -> dict[str, Any]:
-    """The JSON Schema of the history."""
-    return HistoryDocument.json_schema()
-
-
 def history_document(
     triages: Sequence[Triaged], verified: Sequence[Verified], limit: int | None = None
 ) -> HistoryDocument:
@@ -186,11 +181,6 @@ def _since(since: Since) -> SinceEntry:
     ]
     at = run.document["log"].get("start") or run.at
     return publish(SinceEntry, since, at=at, log=clean(run.log_path), changed=changed)
-
-
-def history_json(document: HistoryDocument) -> str:
-    """The document, one object."""
-    return document.to_json()
 
 
 def history_text(document: HistoryDocument, *, ascii: bool = False, everything: bool = False) -> str:

@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.diagnose.verdict import fit_text
 from care_core.ecosystems.findings import Health
@@ -152,16 +152,6 @@ def build_inspection(log: Log, trials: Sequence[Trial], choice: ProfileChoice, h
         parameters=parameters,
         profiles=profiles,
     )
-
-
-def inspection_json(document: InspectDocument) -> str:
-    """One object."""
-    return document.to_json()
-
-
-def inspection_schema() -> dict[str, Any]:
-    """The JSON Schema of `care.inspect/1`."""
-    return InspectDocument.json_schema()
 
 
 def _log(log: Log) -> LogEntry:

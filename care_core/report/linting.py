@@ -50,11 +50,6 @@ class LintDocument(Document, kw_only=True):
     findings: list[FindingEntry]
 
 
-def lint_schema() -> dict[str, Any]:
-    """The JSON Schema of the lint document."""
-    return LintDocument.json_schema()
-
-
 def lint_document(linted: Sequence[Linted], target: str) -> LintDocument:
     """The findings as a document."""
     return LintDocument(

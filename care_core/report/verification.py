@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.diagnose.records import ObjectiveResult
 from care_core.diagnose.verdict import STATUS_WORDS, beside
@@ -118,11 +118,6 @@ class VerifyDocument(Document, kw_only=True):
     notes: list[str]
 
 
-def verify_schema() -> dict[str, Any]:
-    """The JSON Schema of the verification."""
-    return VerifyDocument.json_schema()
-
-
 def promise_of(report: TriageDocument, schema: Schema, path: Path) -> Promise:
     """What a report said and promised of the parameters of its profile.
 
@@ -208,11 +203,6 @@ def _objective(check: ObjectiveCheck, before: ObjectiveEntry | None) -> CheckedO
         promised=interval,
         inside=check.inside,
     )
-
-
-def verify_json(document: VerifyDocument) -> str:
-    """The verification as one JSON object."""
-    return document.to_json()
 
 
 def verify_text(document: VerifyDocument, width: int = WIDTH) -> str:

@@ -45,11 +45,6 @@ class WatchEntry(Document, kw_only=True):
     is_new: bool
 
 
-def watch_schema() -> dict[str, Any]:
-    """The JSON Schema of a line."""
-    return WatchEntry.json_schema()
-
-
 def judged_entry(
     number: int,
     at: str,
@@ -85,11 +80,6 @@ def unread_entry(number: int, at: str, log: Path, reason: str, *, sha256: str | 
         number=number, at=at, log=clean(str(log)), sha256=sha256, robot=None, verdict="unreadable", says=clean(reason),
         explanation=None, faults=[], profile=None, fit=None, unfinished=unfinished or None, is_new=True,
     )  # fmt: skip
-
-
-def entry_json(entry: WatchEntry) -> str:
-    """The entry on one line."""
-    return entry.to_json(indent=None)
 
 
 def entry_line(entry: WatchEntry, clock: str, width: int | None, *, ascii: bool = False) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from care_core.diagnose.verdict import chance, fit_text
 from care_core.diagnose.whatif import Answer, Outlook, Over, Question
@@ -80,11 +80,6 @@ class WhatIfDocument(Document, kw_only=True):
     """Of one option many values, beside the changes; None where that was not asked."""
 
 
-def whatif_schema() -> dict[str, Any]:
-    """The JSON Schema of the what-if document."""
-    return WhatIfDocument.json_schema()
-
-
 def whatif_document(question: Question, answer: Answer, over: Over | None = None) -> WhatIfDocument:
     """The answer as a document, with that for the values of one option where it was asked."""
     return WhatIfDocument(
@@ -130,11 +125,6 @@ def _over_entry(over: Over) -> OverEntry:
     ]
     option = over.option
     return OverEntry(option=option.name, unit=option.unit, current=plain_number(over.current), values=entries)
-
-
-def whatif_json(question: Question, answer: Answer, over: Over | None = None) -> str:
-    """The document, one object."""
-    return whatif_document(question, answer, over).to_json()
 
 
 def whatif_text(question: Question, answer: Answer, over: Over | None = None) -> str:

@@ -57,7 +57,7 @@ def whatif(
 ) -> None:
     """Predict what a run would have done with other options. Ends with 0, whatever the probability."""
     from care_core.diagnose.whatif import ask_over, parse_change
-    from care_core.report.whatif import whatif_json, whatif_text
+    from care_core.report.whatif import whatif_document, whatif_text
 
     if not set_ and over is None:
         hint = "Change a parameter with --set OPTION=VALUE, or ask for all of its values with --over OPTION."
@@ -76,7 +76,9 @@ def whatif(
     changes = dict(parse_change(text, question.schema) for text in set_ or ())
     answer, values = question.ask(changes), None if over is None else ask_over(question, over, changes)
     as_json = json or is_json(out)
-    emit((whatif_json if as_json else whatif_text)(question, answer, values), out, force=force, is_plain=not as_json)
+    asked = (question, answer, values)
+    text = whatif_document(*asked).to_json() if as_json else whatif_text(*asked)
+    emit(text, out, force=force, is_plain=not as_json)
 
 
 @app.command()
@@ -95,7 +97,7 @@ def verify(
     no_history: NoHistory = False,
 ) -> None:
     """Tell whether a fix did what it promised. Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
-    from care_core.report.verification import EXIT_CODES, verify_json, verify_text
+    from care_core.report.verification import EXIT_CODES, verify_text
 
     if out is not None and out.exists() and report.exists() and out.samefile(report):
         raise UsageError("That is the report itself.", hint="Name another file.", where=str(out))
@@ -115,5 +117,6 @@ def verify(
         verified = document.plain()
         mention(remember(lambda history: history.add_verification(verified)))
     as_json = json or is_json(out)
-    emit((verify_json if as_json else verify_text)(document), out, force=force, is_plain=not as_json)
+    text = document.to_json() if as_json else verify_text(document)
+    emit(text, out, force=force, is_plain=not as_json)
     raise typer.Exit(EXIT_CODES[document.verdict])

@@ -31,14 +31,14 @@ def baseline(
     from care_core.application.baselining import baseline as propose
     from care_core.application.baselining import site_text
     from care_core.profile.site import site_path
-    from care_core.report.baseline import baseline_json, baseline_text
+    from care_core.report.baseline import baseline_document, baseline_text
 
     with Progress() as progress:
         found = propose(logs, profile, progress)
     if is_json(out):
-        emit(baseline_json(found), out, force=force)
+        emit(baseline_document(found).to_json(), out, force=force)
     else:
-        emit(baseline_json(found) if json else baseline_text(found))
+        emit(baseline_document(found).to_json() if json else baseline_text(found))
         if out is not None and any(proposal.limit is not None for proposal in found.proposals):
             emit(site_text(found, out), out, force=True)  # it keeps what the file holds
             if out.resolve() != site_path():

@@ -34,7 +34,7 @@ def collect(
     some did not, 4 none did.
     """
     from care_core.application.collecting import document_of, exit_code, plan_table, run_campaign
-    from care_core.report.collection import collect_json, collect_text
+    from care_core.report.collection import collect_text
 
     if plan:
         found, table = plan_table(campaign)
@@ -51,7 +51,7 @@ def collect(
         say("interrupted: what was done is kept; give the same command again to go on")
         raise typer.Exit(ExitCode.INTERRUPTED) from None
     document = document_of(collected)
-    emit((collect_json if json else collect_text)(document))
+    emit(document.to_json() if json else collect_text(document))
     if collected.failed:
         say("give the same command with --retry-failed to make those runs again that failed")
     raise typer.Exit(exit_code(collected))

@@ -30,7 +30,7 @@ _LOOK_S = 2.0
 def doctor(json: AsJson = False) -> None:
     """Say what works here and what to do. Ends with 1 where something is to be repaired."""
     from care_core.application.checkup import look_over
-    from care_core.report.checkup import CheckEntry, doctor_document, doctor_json, doctor_text
+    from care_core.report.checkup import CheckEntry, doctor_document, doctor_text
     from care_core.text import clean
 
     with Progress() as progress:
@@ -40,7 +40,7 @@ def doctor(json: AsJson = False) -> None:
         __version__,
         [CheckEntry(name=one.name, status=one.status, says=clean(one.says), do=clean(one.do)) for one in found],
     )
-    emit(doctor_json(document) if json else doctor_text(document))
+    emit(document.to_json() if json else doctor_text(document))
     raise typer.Exit(ExitCode.FAULT if document.status == "fail" else ExitCode.OK)
 
 

@@ -62,7 +62,7 @@ def fleet(
     """
     from care_core.application.fleet import Cluster, survey
     from care_core.outputs import check_replaceable
-    from care_core.report.fleet import check_parquet_path, fleet_json, write_parquet
+    from care_core.report.fleet import check_parquet_path, fleet_document, write_parquet
 
     if parquet is not None:
         check_parquet_path(parquet)
@@ -82,7 +82,7 @@ def fleet(
         write_parquet(parquet, found)
         say(f"wrote {parquet}")
     if json or is_json(out):
-        emit(fleet_json(found), out, force=force)
+        emit(fleet_document(found).to_json(), out, force=force)
     else:
         from care_tui.render.fleet import fleet_text
 

@@ -2,14 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from json import dumps
+from typing import TYPE_CHECKING
 
 import typer
 
 from care_tui.console import emit
 
+if TYPE_CHECKING:
+    from care_core.report.published import Document
+
 app = typer.Typer(name="schema", help="Published formats.", rich_markup_mode=None)
+
+DOCUMENTS: Mapping[str, tuple[str, str]] = {
+    "baseline": ("baseline", "BaselineDocument"),
+    "collect": ("collection", "CollectDocument"),
+    "fleet": ("fleet", "FleetDocument"),
+    "graph": ("graph", "GraphDocument"),
+    "compare": ("comparison", "CompareDocument"),
+    "doctor": ("checkup", "DoctorDocument"),
+    "history": ("history", "HistoryDocument"),
+    "lint": ("linting", "LintDocument"),
+    "triage": ("document", "TriageDocument"),
+    "inspect": ("inspection", "InspectDocument"),
+    "verify": ("verification", "VerifyDocument"),
+    "watch": ("watching", "WatchEntry"),
+    "whatif": ("whatif", "WhatIfDocument"),
+}
+"""By the command that prints it with --json, the module of `care_core.report` and the document."""
 
 
 @app.callback()
@@ -17,111 +39,17 @@ def _formats() -> None:
     pass
 
 
-@app.command("baseline")
-def baseline() -> None:
-    """Print the JSON Schema of 'care baseline --json'."""
-    from care_core.report.baseline import baseline_schema
-
-    _print(baseline_schema())
-
-
-@app.command("collect")
-def collect() -> None:
-    """Print the JSON Schema of 'care collect --json'."""
-    from care_core.report.collection import collect_schema
-
-    _print(collect_schema())
+def document(command: str) -> type[Document]:
+    """What a command prints with --json, imported when it is asked for."""
+    module, name = DOCUMENTS[command]
+    kind: type[Document] = getattr(import_module(f"care_core.report.{module}"), name)
+    return kind
 
 
-@app.command("fleet")
-def fleet() -> None:
-    """Print the JSON Schema of 'care fleet --json'."""
-    from care_core.report.fleet import fleet_schema
-
-    _print(fleet_schema())
+def _printing(command: str) -> Callable[[], None]:
+    return lambda: emit(dumps(document(command).json_schema(), indent=2) + "\n")
 
 
-@app.command("graph")
-def graph() -> None:
-    """Print the JSON Schema of 'care graph --json'."""
-    from care_core.report.graph import graph_schema
-
-    _print(graph_schema())
-
-
-@app.command("compare")
-def compare() -> None:
-    """Print the JSON Schema of 'care compare --json'."""
-    from care_core.report.comparison import compare_schema
-
-    _print(compare_schema())
-
-
-@app.command("doctor")
-def doctor() -> None:
-    """Print the JSON Schema of 'care doctor --json'."""
-    from care_core.report.checkup import doctor_schema
-
-    _print(doctor_schema())
-
-
-@app.command("history")
-def history() -> None:
-    """Print the JSON Schema of 'care history --json'."""
-    from care_core.report.history import history_schema
-
-    _print(history_schema())
-
-
-@app.command("lint")
-def lint() -> None:
-    """Print the JSON Schema of 'care lint --json'."""
-    from care_core.report.linting import lint_schema
-
-    _print(lint_schema())
-
-
-@app.command("triage")
-def triage() -> None:
-    """Print the JSON Schema of 'care triage --json'."""
-    from care_core.report.document import json_schema
-
-    _print(json_schema())
-
-
-@app.command("inspect")
-def inspect() -> None:
-    """Print the JSON Schema of 'care inspect --json'."""
-    from care_core.report.inspection import inspection_schema
-
-    _print(inspection_schema())
-
-
-@app.command("verify")
-def verify() -> None:
-    """Print the JSON Schema of 'care verify --json'."""
-    from care_core.report.verification import verify_schema
-
-    _print(verify_schema())
-
-
-@app.command("watch")
-def watch() -> None:
-    """Print the JSON Schema of a line of 'care watch --json'."""
-    from care_core.report.watching import watch_schema
-
-    _print(watch_schema())
-
-
-@app.command("whatif")
-def whatif() -> None:
-    """Print the JSON Schema of 'care whatif --json'."""
-    from care_core.report.whatif import whatif_schema
-
-    _print(whatif_schema())
-
-
-def _print(schema: Mapping[str, Any]) -> None:
-    from json import dumps
-
-    emit(dumps(schema, indent=2) + "\n")
+for _command in DOCUMENTS:
+    _what = "a line of " if _command == "watch" else ""
+    app.command(_command, help=f"Print the JSON Schema of {_what}'care {_command} --json'.")(_printing(_command))

@@ -26,12 +26,12 @@ MOST_FAILURES = 20
 def inspect(log: LogPath, json: AsJson = False) -> None:
     """Show what a log holds. Span, channels, parameters, damage, missions, and what each profile would miss."""
     from care_core.application import api
-    from care_core.report.inspection import inspection_json, inspection_text
+    from care_core.report.inspection import inspection_text
 
     with Progress() as progress:
         progress("reading the log", 0.0)
         document = api.inspect(log)
-    emit(inspection_json(document) if json else inspection_text(document))
+    emit(document.to_json() if json else inspection_text(document))
 
 
 @app.command()

@@ -49,7 +49,7 @@ def history(
     from care_core.history.store import SWITCH, History, history_path
     from care_core.history.track_record import track_record, write_record
     from care_core.profile.store import load_profile
-    from care_core.report.history import history_document, history_json, history_text
+    from care_core.report.history import history_document, history_text
 
     path = history_path()
     if path is None:
@@ -71,7 +71,7 @@ def history(
         return
     document = history_document(triages, store.verifications(profile), limit)
     as_json = json or is_json(out)
-    text = history_json(document) if as_json else history_text(document, ascii=ascii, everything=everything)
+    text = document.to_json() if as_json else history_text(document, ascii=ascii, everything=everything)
     emit(text, out, force=force, is_plain=not as_json)
 
 

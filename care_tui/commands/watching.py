@@ -178,11 +178,11 @@ class _Screen(Struct, eq=False, dict=True):
             say("Number and Enter opens that log in the app, Enter the last one, l and Enter lists all; Ctrl+C ends.")
 
     def show(self, entry: WatchEntry) -> None:
-        from care_core.report.watching import entry_json, entry_line
+        from care_core.report.watching import entry_line
 
         self.entries.append(entry)
         if self.is_json:
-            self._print(entry_json(entry))
+            self._print(entry.to_json(indent=None))
             return
         width = None
         if sys.stdout.isatty():

@@ -10,7 +10,7 @@ import jsonschema
 import pytest
 
 from care_core.profile.site import site_path
-from care_core.report.baseline import baseline_schema
+from care_core.report.baseline import BaselineDocument
 from tests.conftest import Care
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +37,7 @@ def test_one_good_run_proposes_a_limit_for_every_objective(care: Care) -> None:
 def test_the_document_keeps_its_schema_and_refuses_what_failed(care: Care, cut: Path) -> None:
     done = care("baseline", GOOD, cut, "--json")
     document = json.loads(done.stdout)
-    jsonschema.validate(document, baseline_schema())
+    jsonschema.validate(document, BaselineDocument.json_schema())
     assert done.code == 3
     assert (document["runs"], document["logs"]) == (1, 2)
     (refused,) = document["refused"]

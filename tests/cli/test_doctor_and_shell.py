@@ -15,7 +15,7 @@ from care_core.application import checkup
 from care_core.files import bundled, profile_folders
 from care_core.profile import store
 from care_core.records import read
-from care_core.report.checkup import DoctorDocument, doctor_schema, doctor_text
+from care_core.report.checkup import DoctorDocument, doctor_text
 from tests.conftest import Care
 
 ROOT = Path(__file__).parents[2]
@@ -39,7 +39,7 @@ def _few_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_where_all_is_well_the_doctor_says_so(care: Care) -> None:
     outcome = care("doctor", "--json")
     assert outcome.code == 0
-    jsonschema.validate(json.loads(outcome.stdout), doctor_schema())
+    jsonschema.validate(json.loads(outcome.stdout), DoctorDocument.json_schema())
     found = statuses(outcome.stdout)
     assert found["profiles"] == found["history"] == found["folder of settings"] == "ok"
     assert found["terminal"] == "warn", "the tests have none"

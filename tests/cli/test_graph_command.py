@@ -16,7 +16,7 @@ import pytest
 from care_core.files import bundled
 from care_core.profile.store import Profile, available_profiles
 from care_core.records import replace
-from care_core.report.graph import graph_document, graph_schema, graph_text
+from care_core.report.graph import GraphDocument, graph_document, graph_text
 from care_core.report.graph_files import graph_dot, graph_graphml
 from tests.conftest import Care
 
@@ -56,7 +56,7 @@ def test_top_says_how_many_paths_are_printed(care: Care) -> None:
 
 def test_the_json_is_what_its_schema_says(care: Care) -> None:
     document = json.loads(care("graph", "arducopter", "--json").stdout)
-    jsonschema.validate(document, graph_schema())
+    jsonschema.validate(document, GraphDocument.json_schema())
     assert json.loads(care("schema", "graph").stdout)["title"] == document["schema"] == "care.graph/1"
     assert {node["role"] for node in document["nodes"]} == {"option", "context", "metric", "objective"}
     hidden = [edge for edge in document["edges"] if edge["kind"] == "bidirected"]

@@ -16,9 +16,9 @@ from care_core.application.comparing import Compared, _departure
 from care_core.application.sharing import Sharing
 from care_core.errors import UsageError
 from care_core.report.comparison import (
+    CompareDocument,
     EventPairEntry,
     compare_document,
-    compare_schema,
     comparison_markdown,
     sections_of,
 )
@@ -135,8 +135,8 @@ def test_the_command_prints_lines_of_80_columns_and_a_document_of_its_schema(car
     assert outcome.code == 0
     assert all(len(line) <= 80 for line in outcome.stdout.splitlines())
     document = json.loads(care("compare", GOOD_DRIVE, FAILED_DRIVE, "--json").stdout)
-    jsonschema.validate(document, compare_schema())
-    assert json.loads(care("schema", "compare").stdout) == compare_schema()
+    jsonschema.validate(document, CompareDocument.json_schema())
+    assert json.loads(care("schema", "compare").stdout) == CompareDocument.json_schema()
 
 
 def test_what_is_sent_has_no_positions_and_anonymous_no_names(flights: Compared) -> None:

@@ -24,7 +24,7 @@ from care_core.application.sharing import Sharing
 from care_core.application.signals import signals_of
 from care_core.files import bundled
 from care_core.outputs import write_binary
-from care_core.report.document import json_schema
+from care_core.report.document import TriageDocument
 from tests.conftest import Care
 
 SAMPLE = bundled("samples", "arducopter_motor.BIN")
@@ -50,7 +50,7 @@ def test_it_holds_reports_parameters_signals_messages_versions_and_what_is_missi
     assert next(iter(files)) == "README.txt"
     assert set(files) == set(bundle.files)
     document = json.loads(files["report.json"])
-    jsonschema.validate(document, json_schema())
+    jsonschema.validate(document, TriageDocument.json_schema())
     assert document["log"]["path"] == SAMPLE.name, "no folder of this computer"
     assert files["report.html"].startswith("<!doctype html>")
     assert files["report.md"].startswith("# Triage of")

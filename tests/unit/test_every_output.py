@@ -16,11 +16,11 @@ from care_core.diagnose.whatif import question
 from care_core.history.store import Triaged
 from care_core.records import replace
 from care_core.report.document import build_document
-from care_core.report.history import history_document, history_json, history_text
+from care_core.report.history import history_document, history_text
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
-from care_core.report.whatif import whatif_json, whatif_text
+from care_core.report.whatif import whatif_document, whatif_text
 from care_core.report.writers import published, to_json, to_yaml
 from care_core.run import Fit, FitVerdict
 from care_tui.render.answer import answer_lines
@@ -52,7 +52,7 @@ def outputs(diagnosis: Diagnosis) -> Mapping[str, str]:
         "markdown": to_markdown(report),
         "html": to_html(report),
         "history": history_text(history),
-        "history json": history_json(history),
+        "history json": history.to_json(),
     }
 
 
@@ -90,7 +90,7 @@ def test_every_output_says_how_well_the_profile_fits_behind_its_verdict(
     asked = replace(reading.question, profile=replace(reading.choice, fit=choice.fit))
     answer = asked.ask({OPTION: 40.0})
     assert whatif_text(asked, answer).startswith(expected)
-    assert list(json.loads(whatif_json(asked, answer)))[:2] == ["schema", "fit"]
+    assert list(json.loads(whatif_document(asked, answer).to_json()))[:2] == ["schema", "fit"]
 
 
 def test_the_odds_without_a_change_are_never_cut_off() -> None:
@@ -140,7 +140,7 @@ def test_a_value_that_no_source_holds_is_shown_as_assumed_in_every_output(readin
     asked = question(replace(judged, run=replace(judged.run, config=config)), reading.profile, reading.choice)
     answer = asked.ask({OPTION: 40.0})
     assert f"{OPTION}  19 (assumed) -> 40 cm/s" in whatif_text(asked, answer)
-    assert json.loads(whatif_json(asked, answer))["changes"][0]["assumed"] is True
+    assert json.loads(whatif_document(asked, answer).to_json())["changes"][0]["assumed"] is True
 
 
 def test_no_probability_outside_the_training_runs_stands_without_its_warning(reading: Reading) -> None:
@@ -158,7 +158,7 @@ def test_no_probability_outside_the_training_runs_stands_without_its_warning(rea
     answer = reading.question.ask({OPTION: 400.0})
     asked = Fix(answer.changes, answer.p_ok, {str(i): one.predicted for i, one in enumerate(answer.outlooks)})
     assert asked.is_guess
-    assert json.loads(whatif_json(reading.question, answer))["guess"] is True
+    assert json.loads(whatif_document(reading.question, answer).to_json())["guess"] is True
     assert unwarned(whatif_text(reading.question, answer), asked) == []
 
 

@@ -12,7 +12,7 @@ from care_core.errors import ExitCode, UsageError
 from care_core.fleet.fleet_report import Fleet, together
 from care_core.fleet.rows import Row, by_folder, row_of, unreadable
 from care_core.records import replace
-from care_core.report.fleet import check_parquet_path, fleet_json, fleet_schema, short_names, write_parquet
+from care_core.report.fleet import FleetDocument, check_parquet_path, fleet_document, short_names, write_parquet
 from care_core.run import Robot
 from care_tui.render.fleet import MOST_ROWS, fleet_text
 from tests.made import HOSTILE, made_diagnosis
@@ -63,8 +63,8 @@ def test_the_text_has_80_columns_and_steers_nothing() -> None:
 
 def test_the_document_is_by_its_schema() -> None:
     jsonschema = pytest.importorskip("jsonschema")
-    document = json.loads(fleet_json(made_fleet()))
-    jsonschema.validate(document, fleet_schema())
+    document = json.loads(fleet_document(made_fleet()).to_json())
+    jsonschema.validate(document, FleetDocument.json_schema())
     assert document["schema"] == "care.fleet/1"
     assert [row["status"] for row in document["rows"]] == ["fault", "fault", "fault", "unreadable"]
     assert document["rows"][2]["copy_of"] == document["rows"][1]["log"]

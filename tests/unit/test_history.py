@@ -20,7 +20,7 @@ from care_core.errors import CareError
 from care_core.history.store import History, HistoryError, Verified, history_path
 from care_core.history.track_record import sparkline, track_record, trends, write_record
 from care_core.report.document import build_document, remembered_verdict
-from care_core.report.history import history_document, history_json, history_schema, history_text
+from care_core.report.history import HistoryDocument, history_document, history_text
 from care_core.report.reading import document_of
 from care_core.report.writers import published
 from tests.conftest import Care
@@ -160,7 +160,7 @@ def test_the_document_fits_its_schema_and_the_text_is_clean(history: History) ->
     history.add_triage({**triage_of(1), "log": {**triage_of(1)["log"], "path": "/a/\x1b[31m.BIN"}}, 1)  # type: ignore[dict-item]
     history.add_verification(verification_of(1, 0.9, True))
     document = history_document(history.triages(), history.verifications())
-    jsonschema.validate(json.loads(history_json(document)), history_schema())
+    jsonschema.validate(json.loads(document.to_json()), HistoryDocument.json_schema())
     text = history_text(document)
     assert "\x1b" not in text
     assert "verified fixes: 1, worked 1, promised 0.9" in text

@@ -14,7 +14,7 @@ from care_core.lint.linting import lint
 from care_core.lint.problems import Problem
 from care_core.lint.rules import ROS1_RENAMED, ROS2_RENAMED, RULES, Renamed
 from care_core.metadata import navigation
-from care_core.report.linting import lint_document, lint_sarif, lint_schema, lint_text
+from care_core.report.linting import LintDocument, lint_document, lint_sarif, lint_text
 from tests.conftest import Care
 
 
@@ -234,7 +234,7 @@ def test_documents_follow_their_schemas(tmp_path: Path, care: Care) -> None:
     path.write_text(HUSKY)
     linted = lint([str(path)])
     document = json.loads(lint_document(linted, "").to_json())
-    jsonschema.validate(document, lint_schema())
+    jsonschema.validate(document, LintDocument.json_schema())
     sarif = lint_sarif(linted, "1")
     results = sarif["runs"][0]["results"]
     assert [one["locations"][0]["physicalLocation"]["region"]["startLine"] for one in results] == [2, 5, 7, 8]

@@ -19,7 +19,7 @@ from care_core.ecosystems.findings import NOTHING_SEEN
 from care_core.errors import UsageError
 from care_core.files import write_atomically
 from care_core.records import replace
-from care_core.report.document import build_document, json_schema
+from care_core.report.document import TriageDocument, build_document
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
@@ -77,7 +77,7 @@ def test_what_is_not_a_number_becomes_null() -> None:
 
 
 def test_the_document_keeps_its_published_schema() -> None:
-    schema = json_schema()
+    schema = TriageDocument.json_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     for diagnosis in (made_diagnosis(), replace(made_diagnosis(), fix=None, faults=(), abstained="wind")):
         jsonschema.validate(json.loads(to_json(build_document(diagnosis))), schema)
@@ -182,7 +182,7 @@ def test_a_log_without_a_profile_tells_what_happened() -> None:
     choice = ProfileChoice("", "", "", "", Fit("no", ("none of the 5 installed profiles reads px4-ulg",)))
     diagnosis = unjudged(made.run.log, made.run.settings, choice, made.health)
     document = json.loads(to_json(build_document(diagnosis)))
-    jsonschema.validate(document, json_schema())
+    jsonschema.validate(document, TriageDocument.json_schema())
     assert document["profile"] is None
     assert document["fit"] == {"verdict": "no", "reasons": ["none of the 5 installed profiles reads px4-ulg"]}
     assert document["objectives"] == document["faults"] == []
@@ -252,7 +252,7 @@ def test_what_changed_since_the_good_run_is_in_every_format() -> None:
     diagnosis = with_evidence(made_diagnosis(), since)
     report = build_document(diagnosis)
     document = json.loads(to_json(report))
-    jsonschema.validate(document, json_schema())
+    jsonschema.validate(document, TriageDocument.json_schema())
     assert document["since"]["changes"][0] == {
         "parameter": "LAND_SPEED", "option": "land_speed", "from": 50.0, "to": 16.0
     }  # fmt: skip

@@ -17,7 +17,7 @@ from care_core.history.store import About, History, Triaged
 from care_core.history.trends import ALPHA, RobotRuns, by_robot, kendall, pettitt
 from care_core.report.document import build_document
 from care_core.report.exporting import export_history
-from care_core.report.history import history_document, history_json, history_schema, history_text
+from care_core.report.history import HistoryDocument, history_document, history_text
 from care_core.report.writers import published
 from care_core.run import Robot
 from tests.conftest import Care
@@ -172,8 +172,8 @@ def test_the_document_fits_its_schema_and_steers_no_terminal() -> None:
     hostile = Robot("x", f"bot {HOSTILE}", HOSTILE, True)
     runs = [run(n, 120.0 + n, hostile, settings={HOSTILE: float(n)}, log=f"/{HOSTILE}{n}.BIN") for n in range(10)]
     document = history_document(list(reversed(runs)), ())
-    text = history_json(document)
-    jsonschema.validate(json.loads(text), history_schema())
+    text = document.to_json()
+    jsonschema.validate(json.loads(text), HistoryDocument.json_schema())
     for shown in (history_text(document), history_text(document, ascii=True)):
         assert all(line.isprintable() for line in shown.splitlines())
     assert history_text(document, ascii=True).isascii()

@@ -25,7 +25,7 @@ from care_core.history.watched import MOST_ATTEMPTS, WatchBook
 from care_core.parallel import Failed
 from care_core.records import replace
 from care_core.report.document import build_document
-from care_core.report.watching import WatchEntry, entry_json, entry_line, judged_entry, unread_entry, watch_schema
+from care_core.report.watching import WatchEntry, entry_line, judged_entry, unread_entry
 from care_core.report.writers import published
 from care_core.run import Robot
 from care_core.text import clean
@@ -284,9 +284,9 @@ def test_a_line_fits_and_nothing_in_it_steers_the_terminal(name: str, width: int
 
 def test_a_line_of_json_fits_its_schema() -> None:
     for entry in (entry_of(), unread_entry(2, "t", Path("/a\x1b"), HOSTILE, sha256=None, unfinished="")):
-        text = entry_json(entry)
+        text = entry.to_json(indent=None)
         assert text.count("\n") == 1
-        jsonschema.validate(json.loads(text), watch_schema())
+        jsonschema.validate(json.loads(text), WatchEntry.json_schema())
         assert "\\u001b" not in text
 
 
