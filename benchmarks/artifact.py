@@ -21,9 +21,9 @@ import statsmodels.api as sm
 from scipy.stats import levene
 from sklearn.preprocessing import scale
 
-from care_core.causal.kernel import FloatArray
 from care_core.learn.fault_files import FaultFile, read_faults
 from care_core.learn.naming import SLOPES
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 
@@ -40,12 +40,12 @@ def slopes(schema: Schema, fault: FaultFile) -> dict[str, float]:
     and at 0. Columns that never vary get what rounding leaves of them."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # constant columns: the design is singular, which is the point
-        values: FloatArray = scale(fault.runs.to_numpy(dtype=float))
+        values: Floats = scale(fault.runs.to_numpy(dtype=float))
         table = dict(zip(fault.runs.columns, values.T, strict=True))
         return {option.name: _slope(table[option.name], table[fault.objective]) for option in schema.options}
 
 
-def _slope(x: FloatArray, y: FloatArray) -> float:
+def _slope(x: Floats, y: Floats) -> float:
     ones = np.ones(len(x))
     model = sm.GLM(y, np.column_stack([ones, x]), family=sm.families.Gaussian()).fit()
     at_one, at_zero = (model.predict(np.column_stack([ones, level])).mean() for level in (ones, 0 * ones))

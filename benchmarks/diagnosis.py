@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from care_core.causal.abduction import ErrorCovariance, next_passes
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.graph import CausalGraph
-from care_core.causal.kernel import FloatArray
 from care_core.causal.model import UNKNOWN_CARRY_OVER
 from care_core.diagnose.judging import query_of, read_and_judge
 from care_core.diagnose.ranking import deviating
@@ -39,6 +38,7 @@ from care_core.learn.skill import all_met, calibration_error, held_out_probabili
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
 from care_core.logs.opening import open_log
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, load_profile
 from care_core.records import Record, Struct, field, replace
@@ -65,9 +65,9 @@ LOWERED = 0.98
 class HeldOut(Record):
     """Training missions: probability by models that had not seen them, and whether all was met; shape (n,) each."""
 
-    care: FloatArray
-    plain: FloatArray
-    met: FloatArray
+    care: Floats
+    plain: Floats
+    met: Floats
 
 
 def _graph(schema: Schema, runs: pd.DataFrame, rng: np.random.Generator) -> CausalGraph:
@@ -297,7 +297,7 @@ def _count_probabilities(
 
 def abducted(
     classifier: PlainClassifier, config: Mapping[str, float], changed: Sequence[Mapping[str, float]], failures: int
-) -> FloatArray:
+) -> Floats:
     """The classifier's probabilities given the failures, as the engine's; nothing is known of its errors."""
     same, ones = UNKNOWN_CARRY_OVER.same, np.ones(len(changed))
     errors = ErrorCovariance(variance=ones, covariance=same * ones, here=1.0, repeated=same)
@@ -356,13 +356,11 @@ def _show_probabilities(tally: Tally) -> None:
                     print(f"    {mean:9.2f} {seen:4.2f} {count:4d}")
 
 
-def brier(p: FloatArray, met: FloatArray) -> float:
+def brier(p: Floats, met: Floats) -> float:
     return float(((p - met) ** 2).mean())
 
 
-def _with_interval(
-    measure: Callable[[FloatArray, FloatArray], float], p: FloatArray, met: FloatArray, groups: NDArray[np.str_]
-) -> str:
+def _with_interval(measure: Callable[[Floats, Floats], float], p: Floats, met: Floats, groups: NDArray[np.str_]) -> str:
     """The measure with its 90 % interval over resampled groups (faults are drawn whole)."""
     rng = np.random.default_rng(0)
     members = [np.flatnonzero(groups == group) for group in np.unique(groups)]

@@ -29,7 +29,8 @@ from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import FisherZ, IndependenceTest, IntArray, discover
 from care_core.learn.orientation import has_latent_cause, joint_distribution, resolve
 from care_core.learn.screening import screen_options
-from care_core.learn.table import FloatArray, normal_scores
+from care_core.learn.table import normal_scores
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from tests.robots import random_robot
@@ -38,7 +39,7 @@ from tests.robots import random_robot
 class Pearson(FisherZ):
     """Fisher's z on the values as they are."""
 
-    def __init__(self, data: FloatArray) -> None:
+    def __init__(self, data: Floats) -> None:
         super().__init__(data)
         sd = np.nanstd(data, axis=0)
         self._scores = (data - np.nanmean(data, axis=0)) / np.where(sd > 0, sd, 1.0)
@@ -47,12 +48,12 @@ class Pearson(FisherZ):
 class WithMagnitudes:
     """Fisher's z on normal scores and on their magnitudes, given both: sees an optimum inside. Smallest p, times 3."""
 
-    def __init__(self, data: FloatArray) -> None:
+    def __init__(self, data: Floats) -> None:
         scores = normal_scores(data)
         self._columns = data.shape[1]
         self._test = FisherZ(np.column_stack([scores, np.abs(scores)]))
 
-    def p_values(self, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+    def p_values(self, x: IntArray, y: IntArray, given: IntArray) -> Floats:
         both = np.column_stack([given, given + self._columns]) if given.shape[1] else given
         k = self._columns
         p = np.array([self._test.p_values(a, b, both) for a, b in ((x, y), (x + k, y), (x, y + k))])
@@ -63,7 +64,7 @@ class WithMagnitudes:
 class Way(Record):
     """One way from a table to a graph."""
 
-    test: Callable[[FloatArray], IndependenceTest] = FisherZ
+    test: Callable[[Floats], IndependenceTest] = FisherZ
     alpha: float = 0.01
     completion_rate: float | None = RATE
     """False discovery rate of the completion; None: none."""
@@ -169,7 +170,7 @@ def show_latent() -> None:
             print(f"{kind:27s} correlation {r}: called latent {found} of {PAIRS}")
 
 
-def _pair(kind: str, r: float, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _pair(kind: str, r: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
     cause, own, other = rng.normal(size=(3, PAIR_RUNS))
     if kind == "direct effect":
         return cause, r * cause + np.sqrt(1 - r**2) * own

@@ -28,7 +28,6 @@ from joblib import Parallel, delayed
 
 from benchmarks.diagnosis import abducted
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
 from care_core.diagnose.advice import MIN_PROBABILITY
 from care_core.diagnose.ranking import deviating, suspects
@@ -36,6 +35,7 @@ from care_core.diagnose.reference import profile_config
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.outcomes import met
 from care_core.learn.train import TrainSettings, train
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import Struct, field
 from tests.robots import Chosen, Robot, declared_random, random_robot
@@ -148,7 +148,7 @@ def _plain_answer(
     return Answer(plain.rank(config, reference, off), _by_option(off, promised), _by_option(off, told))
 
 
-def _by_option(options: Sequence[str], probabilities: FloatArray) -> dict[str, float]:
+def _by_option(options: Sequence[str], probabilities: Floats) -> dict[str, float]:
     return dict(zip(options, probabilities.tolist(), strict=True))
 
 

@@ -19,7 +19,6 @@ import numpy as np
 import pandas as pd
 
 from care_core.application.training import evaluation_as_text
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import Mechanism
 from care_core.learn.completion import complete
 from care_core.learn.evaluation import evaluate
@@ -29,6 +28,7 @@ from care_core.learn.outcomes import inputs_of
 from care_core.learn.screening import screen_options
 from care_core.learn.table import normal_scores, read_table
 from care_core.learn.transfer import carry_over, out_of_support
+from care_core.numbers import Floats
 from care_core.profile.store import Profile, load_profile
 
 RANKS = {
@@ -170,8 +170,8 @@ def _effects(
     return effects
 
 
-def _held(background: FloatArray, mechanism: Mechanism, option: str, value: float) -> FloatArray:
-    grid: FloatArray = background.copy()
+def _held(background: Floats, mechanism: Mechanism, option: str, value: float) -> Floats:
+    grid: Floats = background.copy()
     grid[:, mechanism.inputs.index(option)] = value
     return grid
 

@@ -29,7 +29,6 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
-from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
 from care_core.diagnose.judging import judge, query_of
 from care_core.diagnose.ranking import deviating
@@ -37,6 +36,7 @@ from care_core.diagnose.records import Cause, Diagnosis
 from care_core.diagnose.triage import diagnose
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.train import TrainSettings, train
+from care_core.numbers import Floats
 from care_core.profile.model import write_model
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
@@ -97,12 +97,12 @@ class Planted(Record):
             known=self.known, digest="d" * 64,
         )  # fmt: skip
 
-    def drive(self, options: FloatArray, noise: FloatArray) -> pd.DataFrame:
+    def drive(self, options: Floats, noise: Floats) -> pd.DataFrame:
         """What missions record. options: (n, 8), noise: (n, 5), standard normal."""
         s = 3 * (options - REFERENCE)
         s[:, : len(self.gains)] *= self.gains
         lag, load, stuck, time, wind = noise.T
-        first: FloatArray = 1.4 * (s[:, 0] ** 2) if self.nonlinear else 1.1 * s[:, 0]
+        first: Floats = 1.4 * (s[:, 0] ** 2) if self.nonlinear else 1.1 * s[:, 0]
         if self.interaction:
             first = np.where((s[:, 0] > 0.2) & (s[:, 1] > 0.2), 2.2, 0.0)
         second = 1.5 * (s[:, 2] > 0.4) if self.nonlinear else 0.9 * s[:, 2]
@@ -117,7 +117,7 @@ class Planted(Record):
         recorded: pd.DataFrame = frame[list(self.schema.variables)]
         return recorded
 
-    def draw(self, n: int, rng: np.random.Generator, span: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    def draw(self, n: int, rng: np.random.Generator, span: tuple[float, float]) -> tuple[Floats, Floats]:
         """Options and noise of n missions."""
         options = np.where(rng.random((n, 8)) < KEPT, REFERENCE, rng.uniform(*span, (n, 8)))
         noise = rng.normal(size=(n, len(SOURCES)))
@@ -139,10 +139,10 @@ WORLDS = (
 )
 
 
-def again(noise: FloatArray, n: int, rng: np.random.Generator) -> FloatArray:
+def again(noise: Floats, n: int, rng: np.random.Generator) -> Floats:
     """What n next missions under the conditions of one meet. noise: (5,) -> (n, 5)."""
     fresh = rng.normal(size=(n, len(noise)))
-    met: FloatArray = PERSISTS * noise + np.sqrt(1 - PERSISTS**2) * fresh
+    met: Floats = PERSISTS * noise + np.sqrt(1 - PERSISTS**2) * fresh
     return met
 
 
@@ -209,7 +209,7 @@ def measure(world: Planted, seed: int, runs: int, faults: int, learn: Learn = tr
         return score
 
 
-def _leaves_support(world: Planted, options: FloatArray) -> FloatArray:
+def _leaves_support(world: Planted, options: Floats) -> Floats:
     """Failed runs to ask about: where training was narrower, those that an option took outside."""
     low, high = world.span
     outside = ((options[:, :4] < low) | (options[:, :4] > high)).any(axis=1)
@@ -217,7 +217,7 @@ def _leaves_support(world: Planted, options: FloatArray) -> FloatArray:
 
 
 def _judge(
-    score: Score, world: Planted, profile: Profile, plain: PlainClassifier, row: Mapping[str, float], noise: FloatArray
+    score: Score, world: Planted, profile: Profile, plain: PlainClassifier, row: Mapping[str, float], noise: Floats
 ) -> None:
     config = {name: row[name] for name in OPTIONS}
     choice = ProfileChoice("planted", "1", "Planted robot", "")
@@ -255,7 +255,7 @@ def _judge(
         score.kept.append(true_probability(world, {**config, **changed}, noise))
 
 
-def true_probability(world: Planted, config: Mapping[str, float], noise: FloatArray) -> float:
+def true_probability(world: Planted, config: Mapping[str, float], noise: Floats) -> float:
     """Share of next missions under the same conditions that meet everything, the options set by intervention."""
     options = np.tile([config[name] for name in OPTIONS], (NEXT, 1))
     flown = world.drive(options, again(noise, NEXT, np.random.default_rng(7)))
@@ -303,7 +303,7 @@ def show(scores: Mapping[str, Score]) -> None:
               f"{s.abstained:9d}{s.abstained_rightly:8d}")  # fmt: skip
 
 
-def brier(promised: FloatArray, kept: FloatArray) -> float:
+def brier(promised: Floats, kept: Floats) -> float:
     """The expected Brier score of promises against missions that succeed with the probabilities `kept`."""
     return float(((promised - kept) ** 2 + kept * (1 - kept)).mean()) if len(kept) else float("nan")
 

@@ -20,13 +20,13 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, Training
 from care_core.collect.sampling import points
 from care_core.collect.space import Axis, Space
 from care_core.learn.fitting import OUTCOME
 from care_core.learn.outcomes import fit_outcomes
 from care_core.learn.structure import learn_structure
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.variables import Role, Threshold, Variable
 
@@ -56,7 +56,7 @@ SCHEMA = Schema(
 )  # fmt: skip
 
 
-def drive(options: FloatArray, slower: FloatArray, riskier: FloatArray, rng: np.random.Generator) -> pd.DataFrame:
+def drive(options: Floats, slower: Floats, riskier: Floats, rng: np.random.Generator) -> pd.DataFrame:
     """What missions record. options: (n, 24). slower, riskier: what each option off its reference does, (24,)."""
     off = (options - REFERENCE) / (1.0 - REFERENCE)
     harm = np.where(off > 0, off, -off / REFERENCE * (1.0 - REFERENCE))[:, :ACTING]
@@ -69,12 +69,12 @@ def drive(options: FloatArray, slower: FloatArray, riskier: FloatArray, rng: np.
     return recorded
 
 
-def met(frame: pd.DataFrame) -> FloatArray:
+def met(frame: pd.DataFrame) -> Floats:
     """1 where a mission met everything, shape (n,)."""
     return ((frame["success"] == 1) & (frame["time"] <= LIMIT_S)).to_numpy(dtype=float)
 
 
-def one(seed: int, runs: int, way: str) -> FloatArray:
+def one(seed: int, runs: int, way: str) -> Floats:
     """One robot: a campaign, its mechanisms, what they say. The values of COLUMNS."""
     rng = np.random.default_rng(seed)
     slower, riskier = rng.exponential(0.35, len(OPTIONS)), rng.exponential(0.28, len(OPTIONS))

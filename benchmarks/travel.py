@@ -23,12 +23,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, Training
 from care_core.diagnose.judging import Judged, query_of, read_and_judge
 from care_core.diagnose.ranking import deviating
@@ -44,6 +42,7 @@ from care_core.learn.skill import all_met, calibration_error, reliability
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
 from care_core.logs.opening import open_log
+from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, load_profile
 from care_core.records import Struct, field
@@ -79,16 +78,16 @@ class LeftOut(NamedTuple):
     """Predictions of runs whose missions the model never saw, each of shape (n,). A tuple: worker processes know the
     classes of a module that is run as a program by their fields alone."""
 
-    distance: FloatArray
-    error: dict[str, FloatArray]
+    distance: Floats
+    error: dict[str, Floats]
     """Logarithm of measured over predicted."""
-    inside: dict[str, FloatArray]
+    inside: dict[str, Floats]
     """1 where the measured value lies in the 80 % interval, NaN where there is none."""
-    need_error: dict[str, FloatArray]
+    need_error: dict[str, Floats]
     """Logarithm of what the reference flight took over what was said that it needs."""
-    need_inside: dict[str, FloatArray]
-    predicted: FloatArray
-    plain: FloatArray
+    need_inside: dict[str, Floats]
+    predicted: Floats
+    plain: Floats
 
 
 def left_out(frame: pd.DataFrame, schema: Schema, folds: int) -> LeftOut:
@@ -99,10 +98,10 @@ def left_out(frame: pd.DataFrame, schema: Schema, folds: int) -> LeftOut:
     parts = Parallel(n_jobs=2)(delayed(_predict)(frame, schema, fold == k) for k in range(folds))
     order = np.argsort(np.concatenate([np.flatnonzero(fold == k) for k in range(folds)]))
 
-    def joined(of: Sequence[FloatArray]) -> FloatArray:
+    def joined(of: Sequence[Floats]) -> Floats:
         return np.concatenate(of)[order]
 
-    def by_name(of: Sequence[Mapping[str, FloatArray]]) -> dict[str, FloatArray]:
+    def by_name(of: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
         return {name: joined([one[name] for one in of]) for name in measured(schema)}
 
     return LeftOut(
@@ -116,7 +115,7 @@ def left_out(frame: pd.DataFrame, schema: Schema, folds: int) -> LeftOut:
     )
 
 
-def _predict(frame: pd.DataFrame, schema: Schema, test: NDArray[np.bool_]) -> LeftOut:
+def _predict(frame: pd.DataFrame, schema: Schema, test: Bools) -> LeftOut:
     with threadpool_limits(1):
         rng = np.random.default_rng(0)
         train, rows = frame[~test].reset_index(drop=True), frame[test].reset_index(drop=True)
@@ -138,8 +137,8 @@ def _predict(frame: pd.DataFrame, schema: Schema, test: NDArray[np.bool_]) -> Le
 
 
 def _asked(
-    model: Model, schema: Schema, rows: pd.DataFrame, filled: pd.DataFrame, flown: Mapping[str, FloatArray],
-    peer: PlainClassifier, distance: FloatArray,
+    model: Model, schema: Schema, rows: pd.DataFrame, filled: pd.DataFrame, flown: Mapping[str, Floats],
+    peer: PlainClassifier, distance: Floats,
 ) -> LeftOut:  # fmt: skip
     n = len(rows)
     error, inside, need_error, need_inside = ({name: np.full(n, np.nan) for name in measured(schema)} for _ in range(4))
@@ -177,12 +176,12 @@ def _asked(
     return found
 
 
-def _distance(train: pd.DataFrame, rows: pd.DataFrame, contexts: Sequence[str]) -> FloatArray:
+def _distance(train: pd.DataFrame, rows: pd.DataFrame, contexts: Sequence[str]) -> Floats:
     """Of each run's mission from the nearest of training, in standard deviations a context; shape (n,)."""
     scale = train[list(contexts)].std()
     known = (train[list(contexts)] / scale).fillna(0.0).drop_duplicates().to_numpy()
     asked = (rows[list(contexts)] / scale).fillna(0.0).to_numpy()
-    apart: FloatArray = np.sqrt(((asked[:, None, :] - known[None, :, :]) ** 2).mean(axis=2)).min(axis=1)
+    apart: Floats = np.sqrt(((asked[:, None, :] - known[None, :, :]) ** 2).mean(axis=2)).min(axis=1)
     return apart
 
 

@@ -7,15 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.vehicles import Motor, motors_of
 from care_core.logs import formats
 from care_core.logs.base import Table
+from care_core.numbers import Floats
 from care_core.run import Setting
 from tests.tables import TablesLog
-
-Floats = NDArray[np.float64]
 
 STEP_S, END_S, FAILS_S, HEIGHT_M = 0.004, 30.0, 20.0, 12.0
 ARMED_S, HOVER, TURN_S = 5.0, 0.45, 0.02

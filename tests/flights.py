@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.examining import READS, find
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table
+from care_core.numbers import Bools, Floats
 from care_core.run import Damage, Setting
 from tests.tables import TablesLog
 
-Floats = NDArray[np.float64]
 ARMED_S, UP_S, DOWN_S, END_S = 5.0, 8.0, 100.0, 110.0
 HOVER, HEIGHT_M, SPEED_MS = 0.4, 12.0, 4.0
 QUAD_X: Mapping[str, float] = {
@@ -58,7 +57,7 @@ class Made:
     def noise(self, size: float) -> Floats:
         return self.rng.normal(0.0, size, len(self.t))
 
-    def after(self, start_s: float, end_s: float = END_S) -> NDArray[np.bool_]:
+    def after(self, start_s: float, end_s: float = END_S) -> Bools:
         return (self.t >= start_s) & (self.t <= end_s)
 
     def find(self) -> tuple[Finding, ...]:

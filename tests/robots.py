@@ -12,14 +12,13 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph, Edge
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.variables import Role, Threshold, Variable
 
-FloatArray = NDArray[np.float64]
 Shape = Literal["line", "bend", "bump", "step"]
 Chosen = Literal["at random", "by context", "by something hidden"]
 METRIC_KINDS = ("float", "heavy", "count", "bool")
@@ -33,7 +32,7 @@ class Law(Record):
     shape: Shape
     strength: float
 
-    def __call__(self, cause: FloatArray) -> FloatArray:
+    def __call__(self, cause: Floats) -> Floats:
         moved = {
             "line": cause,
             "bend": cause + 0.4 * np.tanh(2 * cause),
@@ -62,8 +61,8 @@ class Robot(Record):
         """A runs table of n missions; NaN for what a refused or failed one does not have."""
         weather = rng.choice([-1.0, 1.0], n)
         wind = weather + 0.4 * rng.normal(size=n) if wind_met is None else np.full(n, wind_met)
-        columns: dict[str, FloatArray] = {}
-        scores: dict[str, FloatArray] = {}
+        columns: dict[str, Floats] = {}
+        scores: dict[str, Floats] = {}
         for variable in self.schema.options:
             columns[variable.name] = self._option(variable, wind, weather, rng)
             if do is not None and variable.name in do:
@@ -90,9 +89,7 @@ class Robot(Record):
     def _driven_by(self, name: str) -> tuple[str, ...]:
         return tuple(parent for parent in self.graph.parents(name) if (parent, name) in self.laws)
 
-    def _option(
-        self, variable: Variable, wind: FloatArray, weather: FloatArray, rng: np.random.Generator
-    ) -> FloatArray:
+    def _option(self, variable: Variable, wind: Floats, weather: Floats, rng: np.random.Generator) -> Floats:
         n = len(wind)
         if variable.labels:
             return rng.integers(0, 3, n).astype(float)
@@ -101,7 +98,7 @@ class Robot(Record):
             return np.clip(0.5 - 0.22 * met + 0.12 * rng.normal(size=n), 0.0, 1.0)
         return rng.uniform(0, 1, n)
 
-    def _gone_where_refused(self, columns: dict[str, FloatArray]) -> pd.DataFrame:
+    def _gone_where_refused(self, columns: dict[str, Floats]) -> pd.DataFrame:
         frame: pd.DataFrame = pd.DataFrame({name: columns[name] for name in self.schema.variables})
         if "armed" in frame:
             refused = frame["armed"] == 0
@@ -112,7 +109,7 @@ class Robot(Record):
         return frame
 
 
-def _measured(kind: str, z: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _measured(kind: str, z: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """What is recorded of a latent value, and what its effects feel of it."""
     if kind == "count":
         count = rng.poisson(np.exp(np.clip(0.8 * z + 1.0, None, 6.0))).astype(float)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.numbers import Floats
 from care_core.records import Struct, field
 from tests.ros_samples import ROS2, SECOND_NS, START_NS, McapFile, cdr, make, stamp
 
@@ -95,7 +96,7 @@ class Drive(Struct, eq=False):
         moving = make(ROS2, "geometry_msgs/msg/TwistWithCovariance", _twist(speed, turn), zeros)
         return make(ROS2, ODOMETRY, _header(t), "base_link", covered, moving)
 
-    def _ranges(self, failing: bool) -> NDArray[np.float64]:
+    def _ranges(self, failing: bool) -> Floats:
         """Distances to the walls of a corridor, and to what appeared in it."""
         angles = self.yaw + np.linspace(-np.pi / 2, np.pi / 2, RAYS)
         ends = [LONG_M] + ([self.x + 1.0] if failing and self.fault == "blocked" else [])
@@ -103,7 +104,7 @@ class Drive(Struct, eq=False):
         with np.errstate(divide="ignore"):
             ahead = [np.where(np.cos(angles) > 1e-6, (end - self.x) / np.cos(angles), np.inf) for end in ends]
             walls = np.where(np.abs(np.sin(angles)) > 1e-6, aside / np.sin(angles), np.inf)
-        ranges: NDArray[np.float64] = np.minimum(np.minimum.reduce([walls, *ahead]), 29.0)
+        ranges: Floats = np.minimum(np.minimum.reduce([walls, *ahead]), 29.0)
         return ranges
 
 

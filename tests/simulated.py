@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.variables import Role, Variable
-
-FloatArray = NDArray[np.float64]
 
 
 def schema_of(roles: dict[str, Role], *, observational: bool = False) -> Schema:
@@ -90,7 +88,7 @@ def simulate(
         coin = rng.choice([-1.5, 1.5], size=n)
         shared[a] = shared[a] + coin
         shared[b] = shared[b] + coin
-    columns: dict[str, FloatArray] = {}
+    columns: dict[str, Floats] = {}
     for name in graph.topological_order():
         parents = graph.parents(name)
         if not parents and roles[name] in (Role.OPTION, Role.CONTEXT):

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.registry import run_model
 from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.formats import LogFormat
+from care_core.numbers import Floats
 from care_core.records import Record, field
 from care_core.run import Damage, Setting
 
@@ -32,7 +30,7 @@ class TablesLog(Record, eq=False):
     def channels(self) -> tuple[Channel, ...]:
         return tuple(Channel(name, name, len(table)) for name, table in self.tables.items())
 
-    def times(self) -> Mapping[str, NDArray[np.float64]]:
+    def times(self) -> Mapping[str, Floats]:
         """As logs of ROS tell them."""
         return {name: table.t for name, table in self.tables.items()}
 

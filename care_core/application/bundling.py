@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from care_core.numbers import Floats
+
 LARGEST = 2_000_000
 """Bytes of a bundle: what forums take as an attachment, and a field link sends in a minute."""
 _RESERVE = 20_000
@@ -222,7 +224,7 @@ def _in_order(line: Line, span: tuple[float, float], most: int) -> NDArray[np.in
     return order[thinned(t[order], values[order], span, most)]
 
 
-def _aligned(line: Line, times: NDArray[np.float64]) -> NDArray[np.float64]:
+def _aligned(line: Line, times: Floats) -> Floats:
     """The values at these times, NaN where the signal has none; of two at one time the last."""
     import numpy as np
 

@@ -17,10 +17,8 @@ from care_core.records import Record, replace
 from care_core.report.plots import Drawing, Line, Plot
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from care_core.diagnose.comparison import Comparison, Departure
+    from care_core.numbers import Floats
     from care_core.report.comparison import CompareDocument
 
 FORMATS = {"text": (), "json": (".json",), "markdown": (".md",), "html": (".html", ".htm")}
@@ -190,7 +188,7 @@ def _from_start(case: OpenRun, sources: Sequence[Source]) -> Mapping[Source, Val
     return {source: (line[0] - start_s, line[1]) for source, line in found.items() if line is not None and len(line[1])}
 
 
-def _grids(one: Values, other: Values) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+def _grids(one: Values, other: Values) -> tuple[Floats, Floats, Floats] | None:
     """Both signals at the same times, as long as both last: times, values of the one and of the other, shape (n,)."""
     import numpy as np
 
@@ -207,7 +205,7 @@ def _grids(one: Values, other: Values) -> tuple[NDArray[np.float64], NDArray[np.
     return times, values[0], values[1]
 
 
-def _range(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def _range(a: Floats, b: Floats) -> float:
     """What both range over, without the outermost values."""
     import numpy as np
 

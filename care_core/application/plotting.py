@@ -12,7 +12,7 @@ from care_core.application.responses import responses_of
 from care_core.application.sharing import EVERYTHING, Sharing
 from care_core.application.signals import LONGEST_GAP, Signal, Source, lines_of, settled_s, signals_of, whole_of
 from care_core.application.signals import Line as Values
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 from care_core.records import replace
 from care_core.report.marks import Mark, marks_of
 from care_core.report.plots import Band, Drawing, Limit, Line, Plot, Point
@@ -172,9 +172,7 @@ def _plot(
     )
 
 
-def segments(
-    t: NDArray[np.float64], values: NDArray[np.float64], span: tuple[float, float], wrap: float | None
-) -> tuple[tuple[Point, ...], ...]:
+def segments(t: Floats, values: Floats, span: tuple[float, float], wrap: float | None) -> tuple[tuple[Point, ...], ...]:
     """A line as few points in pieces; angles that turn over at `wrap` are broken there."""
     import numpy as np
 
@@ -192,9 +190,7 @@ def segments(
     return tuple(tuple((float(t[i]), float(values[i])) for i in one) for one in pieces if len(one))
 
 
-def thinned(
-    t: NDArray[np.float64], values: NDArray[np.float64], span: tuple[float, float], most: int
-) -> NDArray[np.intp]:
+def thinned(t: Floats, values: Floats, span: tuple[float, float], most: int) -> NDArray[np.intp]:
     """Places of at most so many values that show what all would: the least and the greatest of each part of the span,
     the first and the last. Shape (k,), in order of time."""
     import numpy as np

@@ -11,11 +11,9 @@ from care_core.errors import CareError
 from care_core.records import Record, replace
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from care_core.diagnose.records import Diagnosis
     from care_core.logs.base import Channel, Log, Table
+    from care_core.numbers import Floats
 
 Source = tuple[str, str]
 """Channel and field."""
@@ -254,7 +252,7 @@ def trace_of(case: OpenRun, signal: Signal, span: tuple[float, float], columns: 
     return Trace(*span, squeezed[0], squeezed[1] if len(squeezed) > 1 else (), low, high, count)
 
 
-Line = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
+Line = tuple["Floats", "Floats"]
 """Times in seconds of the log and values, both of shape (n,)."""
 
 
@@ -285,7 +283,7 @@ def _line(table: Table | None, field: str, span: tuple[float, float]) -> Line | 
     return table.t[good], values[good]
 
 
-def _squeezed(t: NDArray[np.float64], values: NDArray[np.float64], span: tuple[float, float], columns: int) -> Columns:
+def _squeezed(t: Floats, values: Floats, span: tuple[float, float], columns: int) -> Columns:
     import numpy as np
 
     from care_core.numbers import median

@@ -12,10 +12,8 @@ from care_core.errors import CareError
 from care_core.records import Record
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from care_core.ecosystems.ros.goals import Goal
+    from care_core.numbers import Floats
 
 _METRES_PER_DEGREE = 111_195.0
 _GLOBAL = (("POS", "Lat", "Lng"), ("GPS", "Lat", "Lng"), ("vehicle_global_position", "lat", "lon"))
@@ -66,9 +64,7 @@ def way_of(case: OpenRun) -> Way:
     raise CareError("The log does not say where the robot was.", hint="Record its position.")
 
 
-def _track(
-    case: OpenRun, x: Source, y: Source, span: tuple[float, float]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+def _track(case: OpenRun, x: Source, y: Source, span: tuple[float, float]) -> tuple[Floats, Floats, Floats] | None:
     import numpy as np
 
     lines = lines_of(case, (x, y), span)
@@ -79,9 +75,7 @@ def _track(
     return across[0][some], across[1][some], along[1][some]
 
 
-def _on_the_ground(
-    t: NDArray[np.float64], lng: NDArray[np.float64], lat: NDArray[np.float64], corners: tuple[Point, ...]
-) -> Way:
+def _on_the_ground(t: Floats, lng: Floats, lat: Floats, corners: tuple[Point, ...]) -> Way:
     """Degrees as metres from where the track begins."""
     home = float(lng[0]), float(lat[0])
     track = tuple(_metres(home, (float(east), float(north))) for east, north in zip(lng, lat, strict=True))
@@ -162,11 +156,9 @@ def _frame(case: OpenRun, channel: str, field: str) -> str:
     return str(table[field][0]).strip("/") if table is not None and field in table.columns and len(table) else ""
 
 
-def _way(
-    t: NDArray[np.float64], east: NDArray[np.float64], north: NDArray[np.float64], legs: tuple[Point, ...] = ()
-) -> Way:
+def _way(t: Floats, east: Floats, north: Floats, legs: tuple[Point, ...] = ()) -> Way:
     return Way(_points(east, north), tuple(t.tolist()), legs)
 
 
-def _points(east: NDArray[np.float64], north: NDArray[np.float64]) -> tuple[Point, ...]:
+def _points(east: Floats, north: Floats) -> tuple[Point, ...]:
     return tuple((float(x), float(y)) for x, y in zip(east, north, strict=True))

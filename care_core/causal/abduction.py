@@ -21,8 +21,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import Posterior
+from care_core.numbers import Floats
 from care_core.records import Record, replace
 
 _Z = np.linspace(-6.0, 6.0, 2401)
@@ -44,11 +44,11 @@ class ErrorCovariance(Record, eq=False):
         here: variance of an outcome here. repeated: covariance of two outcomes here.
     """
 
-    variance: FloatArray
-    covariance: FloatArray
+    variance: Floats
+    covariance: Floats
     here: float
     repeated: float
-    noise: FloatArray | float = 0.0
+    noise: Floats | float = 0.0
     """What all the noise would add to the covariance if it carried over, shape (m,); `own_noise`: to `repeated`."""
     own_noise: float = 0.0
 
@@ -76,9 +76,7 @@ def error_covariance(there: Posterior, here: Posterior, carry_over: float) -> Er
     return free.sharing(carry_over)
 
 
-def next_value(
-    errors: ErrorCovariance, latent: FloatArray, expected: float, seen: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def next_value(errors: ErrorCovariance, latent: Floats, expected: float, seen: Floats) -> tuple[Floats, Floats]:
     """Centre and standard deviation of the next outcome, both of shape (m,), on the transformed scale.
 
     Args:
@@ -90,8 +88,8 @@ def next_value(
 
 
 def by_mediators(
-    covariances: Sequence[ErrorCovariance], errors: FloatArray, weights: FloatArray, among: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    covariances: Sequence[ErrorCovariance], errors: Floats, weights: Floats, among: Floats
+) -> tuple[Floats, Floats]:
     """What metrics say of an outcome that k runs do not have: centre and variance of its error at m configurations, as
     shares of its standard deviation and of its variance; shape (m,) each.
 
@@ -103,12 +101,12 @@ def by_mediators(
     seen = np.array([(one.here + (runs - 1) * one.repeated) / runs for one in covariances])
     spread = np.sqrt([one.variance for one in covariances])
     carried = weights[:, None] * np.array([one.covariance for one in covariances]) / spread
-    centre: FloatArray = (errors.mean(axis=0) / seen) @ carried
+    centre: Floats = (errors.mean(axis=0) / seen) @ carried
     share = carried / np.sqrt(seen)[:, None]
     return centre, 1.0 - np.einsum("im,ij,jm->m", share, among, share)
 
 
-def next_passes(errors: ErrorCovariance, chance: FloatArray, here: float, passed: Sequence[bool]) -> FloatArray:
+def next_passes(errors: ErrorCovariance, chance: Floats, here: float, passed: Sequence[bool]) -> Floats:
     """Probability that the next run passes, shape (m,).
 
     What runs of this configuration share is integrated out, weighed by how well it explains which of them passed.
@@ -124,13 +122,13 @@ def next_passes(errors: ErrorCovariance, chance: FloatArray, here: float, passed
         return chance
     left = np.sqrt(np.maximum(1.0 - to_shared**2, 1e-9))[:, None]
     passes = _cdf((_quantile(chance)[:, None] - to_shared[:, None] * _NODES) / left)
-    probability: FloatArray = passes @ weight / weight.sum()
+    probability: Floats = passes @ weight / weight.sum()
     return probability
 
 
-def _cdf(z: FloatArray) -> FloatArray:
+def _cdf(z: Floats) -> Floats:
     return np.asarray(np.interp(z, _Z, _CDF))
 
 
-def _quantile(p: FloatArray) -> FloatArray:
+def _quantile(p: Floats) -> Floats:
     return np.asarray(np.interp(p, _CDF, _Z))

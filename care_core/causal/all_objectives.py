@@ -11,8 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_core.causal.kernel import FloatArray
-from care_core.numbers import logistic, logit
+from care_core.numbers import Floats, logistic, logit
 from care_core.records import Record
 
 _NEAREST = 0.002
@@ -40,7 +39,7 @@ class AllObjectives(Record):
         predicted, share, runs = np.array(curve, dtype=float).T
         x = np.column_stack([np.ones(len(curve)), logit(predicted, _NEAREST)])
 
-        def loss(theta: FloatArray) -> float:
+        def loss(theta: Floats) -> float:
             odds, off = x @ theta, theta - _BELIEVED
             return float((runs * (np.logaddexp(0.0, odds) - share * odds)).sum() + 0.5 * off @ _DOUBT @ off)
 
@@ -58,6 +57,6 @@ class AllObjectives(Record):
         best = float(((runs * share + 0.5) / (runs + 1.0)).max())
         return cls(float(theta[0]), max(float(theta[1]), 0.0), best)
 
-    def of_product(self, product: FloatArray) -> FloatArray:
+    def of_product(self, product: Floats) -> Floats:
         """Probability that everything is met, for products of the single probabilities of any shape."""
         return np.minimum(logistic(self.offset + self.slope * logit(product, _LEAST)), np.maximum(product, self.best))

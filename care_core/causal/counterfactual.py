@@ -23,11 +23,11 @@ from care_core.causal.abduction import (
     next_value,
 )
 from care_core.causal.all_objectives import AllObjectives
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import LEAST, TAIL, Mechanism, Posterior, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_CARRY_OVER, Mediation, Model, NoiseCarryOver, OutcomeRecord, StageRecord
 from care_core.causal.posteriors import PosteriorCache
 from care_core.constraints import Constraint
+from care_core.numbers import Floats
 from care_core.records import Record, field, replace
 from care_core.run import is_known
 from care_core.variables import Threshold, Variable
@@ -44,10 +44,10 @@ Conditions = Literal["same", "another day"]
 class Predicted(Record, eq=False):
     """An objective under m configurations: expected value, 80 % interval, probability of being met; shape (m,)."""
 
-    value: FloatArray
-    low: FloatArray
-    high: FloatArray
-    p_ok: FloatArray
+    value: Floats
+    low: Floats
+    high: Floats
+    p_ok: Floats
 
 
 _Answers = dict[bytes, tuple[float, ...]]
@@ -98,7 +98,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         told = self._functional(outcome, configs) if outcome.stages else self._continuous(outcome, configs)
         return replace(told, p_ok=np.maximum(told.p_ok, self.probability(configs)))  # what is kept with all is kept
 
-    def p_ok(self, objective: str, configs: Sequence[Config]) -> FloatArray:
+    def p_ok(self, objective: str, configs: Sequence[Config]) -> Floats:
         """The probability of `predict` alone, shape (m,): NaN where the objective has no threshold."""
         outcome = self.model.outcomes[objective]
         if outcome.stages:
@@ -108,7 +108,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
             return np.full(len(configs), np.nan)
         return _probability_of(mechanism, bound, self._next(outcome, configs))
 
-    def probability(self, configs: Sequence[Config]) -> FloatArray:
+    def probability(self, configs: Sequence[Config]) -> Floats:
         """Probability that every objective keeps its threshold, shape (m,).
 
         Objectives that move together (DESIGN: time and energy) share one cause: the least likely of a group counts
@@ -127,7 +127,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         is_all = self.model.outcomes.keys() <= self.thresholds.keys()
         return AllObjectives.of(held_out.curve) if held_out is not None and is_all else AllObjectives()
 
-    def all_kept(self, objectives: Sequence[str], configs: Sequence[Config]) -> FloatArray | None:
+    def all_kept(self, objectives: Sequence[str], configs: Sequence[Config]) -> Floats | None:
         """Probability that each of these keeps its threshold, shape (m,), those that move together counted once; None
         where none has one."""
         p_ok = {name: self.p_ok(name, configs) for name in objectives if name in self.thresholds}
@@ -162,7 +162,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
                 rates[name] = summary.share_meeting(bound)
         return rates
 
-    def epistemic_ratio(self, configs: Sequence[Config], objectives: Collection[str] | None = None) -> FloatArray:
+    def epistemic_ratio(self, configs: Sequence[Config], objectives: Collection[str] | None = None) -> Floats:
         """How little training says about the objectives there (all when None): 0 (known) to 1, the least known one's;
         shape (m,). Of one that no mechanism predicts it says nothing."""
         if objectives is not None and not self.model.outcomes.keys() & objectives:
@@ -173,14 +173,14 @@ class CounterfactualQuery(Record, eq=False, dict=True):
             if name in self.thresholds and (objectives is None or name in objectives)
             for key in ([stage.mechanism for stage in outcome.stages] or [outcome.mechanism])
         ]
-        least: FloatArray = np.max([self._epistemic_ratio(key, configs) for key in keys], axis=0)
+        least: Floats = np.max([self._epistemic_ratio(key, configs) for key in keys], axis=0)
         return least
 
-    def _epistemic_ratio(self, key: str, configs: Sequence[Config]) -> FloatArray:
+    def _epistemic_ratio(self, key: str, configs: Sequence[Config]) -> Floats:
         mechanism = self.model.mechanisms[key]
         return self.posteriors.at(mechanism, columns(configs, mechanism.inputs)).epistemic_ratio
 
-    def _groups(self, names: Mapping[str, FloatArray]) -> list[list[str]]:
+    def _groups(self, names: Mapping[str, Floats]) -> list[list[str]]:
         together = [[name for name in group if name in names] for group in self.model.training.moves_together]
         grouped = {name for group in together for name in group}
         return [group for group in together if group] + [[name] for name in names if name not in grouped]
@@ -201,7 +201,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         zero, one = np.zeros_like(p_ok), np.ones_like(p_ok)
         return Predicted(p_ok, np.where(p_ok > INTERVAL[1], one, zero), np.where(p_ok < INTERVAL[0], zero, one), p_ok)
 
-    def _all_stages(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> FloatArray:
+    def _all_stages(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Floats:
         p_ok = np.ones(len(configs))
         runs = [(seen, True) for seen in (self.observed, *self.repeats)]
         for stage in outcome.stages:
@@ -217,11 +217,11 @@ class CounterfactualQuery(Record, eq=False, dict=True):
 
     def _stage_probability(
         self, objective: str, stage: StageRecord, passed: Sequence[bool], configs: Sequence[Config]
-    ) -> FloatArray:
+    ) -> Floats:
         """Probability of passing one stage, given which runs of this configuration passed it."""
         mechanism = self.model.mechanisms[stage.mechanism]
 
-        def ask(x: FloatArray) -> tuple[FloatArray]:
+        def ask(x: Floats) -> tuple[Floats]:
             there = self.posteriors.at(mechanism, x)
             chance = _chance(there, stage.passes, -self._worse(stage.mechanism, there))
             if not passed:
@@ -232,12 +232,10 @@ class CounterfactualQuery(Record, eq=False, dict=True):
             return (np.clip(next_passes(errors, chance, expected, passed), TAIL, 1 - TAIL),)
 
         x = columns(configs, mechanism.inputs)
-        probability: FloatArray = self._once(f"{objective}/{stage.mechanism}", mechanism, x, ask)[0]
+        probability: Floats = self._once(f"{objective}/{stage.mechanism}", mechanism, x, ask)[0]
         return probability
 
-    def _once(
-        self, key: str, mechanism: Mechanism, x: FloatArray, ask: Callable[[FloatArray], tuple[FloatArray, ...]]
-    ) -> FloatArray:
+    def _once(self, key: str, mechanism: Mechanism, x: Floats, ask: Callable[[Floats], tuple[Floats, ...]]) -> Floats:
         """What `ask` answers for each row of x, asked once for each that is new: an array of each of its answers.
 
         Args:
@@ -251,7 +249,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         new = {row: i for i, row in enumerate(rows) if row not in told}
         if new:
             told.update(zip(new, zip(*ask(x[list(new.values())]), strict=True), strict=True))
-        answers: FloatArray = np.array([told[row] for row in rows]).T
+        answers: Floats = np.array([told[row] for row in rows]).T
         return answers
 
     def _passed(self, objective: str, stage: StageRecord, observed: Mapping[str, object]) -> bool | None:
@@ -277,7 +275,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         bound = self.thresholds.get(outcome.objective)
         bad = 1.0 if bound is None or bound.op in ("<=", "<") else -1.0
 
-        def ask(x: FloatArray) -> tuple[FloatArray, ...]:
+        def ask(x: Floats) -> tuple[Floats, ...]:
             there = self.posteriors.at(mechanism, x)
             latent = there.latent + bad * self._worse(outcome.mechanism, there)
             if not len(seen):
@@ -299,13 +297,13 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         mechanism = self.model.mechanisms[key]
         return self.posteriors.at(mechanism, columns([config], mechanism.inputs))
 
-    def _worse(self, key: str, there: Posterior) -> FloatArray:
+    def _worse(self, key: str, there: Posterior) -> Floats:
         """What a mechanism may do beyond what it is expected to, from the configuration that is known; shape (m,)."""
         if self.wary_from is None:
             return np.zeros(len(there.x))
         return UPPER_Z * there.change_sd(self._at(key, self.wary_from))
 
-    def _by_mediators(self, mediation: Mediation | None, configs: Sequence[Config]) -> tuple[FloatArray, FloatArray]:
+    def _by_mediators(self, mediation: Mediation | None, configs: Sequence[Config]) -> tuple[Floats, Floats]:
         """What the metrics of runs that ended before an objective had a value say of it: centre of its error and what
         is left of its variance, as shares; shape (m,) each.
 
@@ -327,11 +325,11 @@ class CounterfactualQuery(Record, eq=False, dict=True):
             errors.append(np.clip(error, -far, far))
         return by_mediators(covariances, np.array(errors).T, np.array(mediation.weights), np.array(mediation.among))
 
-    def _error_covariance(self, metric: str, x: FloatArray) -> ErrorCovariance:
+    def _error_covariance(self, metric: str, x: Floats) -> ErrorCovariance:
         """Of the metric's errors at x (m, p) with those here."""
         here, carry_over = self._at(metric, self.config), self._carry_over(metric)
 
-        def ask(rows: FloatArray) -> tuple[FloatArray, ...]:
+        def ask(rows: Floats) -> tuple[Floats, ...]:
             errors = error_covariance(self.posteriors.at(here.mechanism, rows), here, carry_over)
             return errors.variance, errors.covariance
 
@@ -359,20 +357,20 @@ class _Next(Record, eq=False):
     """The next outcome of m configurations: what it is for each of k shares of the noise that may carry over, (k, m),
     and how likely each share is, (k,)."""
 
-    centre: FloatArray
-    sd: FloatArray
-    weights: FloatArray
+    centre: Floats
+    sd: Floats
+    weights: Floats
 
     @property
-    def mean(self) -> FloatArray:
+    def mean(self) -> Floats:
         return np.asarray(self.weights @ self.centre)
 
-    def share_below(self, mechanism: Mechanism, values: FloatArray) -> FloatArray:
+    def share_below(self, mechanism: Mechanism, values: Floats) -> Floats:
         """Distribution function, shape (m,); of values (..., 1, m) of shape (..., m)."""
-        below: FloatArray = self.weights @ mechanism.share_below((values - self.centre) / self.sd)
+        below: Floats = self.weights @ mechanism.share_below((values - self.centre) / self.sd)
         return below
 
-    def quantiles(self, mechanism: Mechanism, shares: Sequence[float]) -> FloatArray:
+    def quantiles(self, mechanism: Mechanism, shares: Sequence[float]) -> Floats:
         """Of so many shares, shape (len(shares), m), by halving: between the least and the largest of those of the
         single shares of noise."""
         each = self.centre + np.array([mechanism.error_quantile(share) for share in shares])[:, None, None] * self.sd
@@ -385,13 +383,13 @@ class _Next(Record, eq=False):
         return np.asarray((low + high) / 2)
 
 
-def _chance(there: Posterior, passes: float, beyond: FloatArray | float = 0.0) -> FloatArray:
+def _chance(there: Posterior, passes: float, beyond: Floats | float = 0.0) -> Floats:
     """Probability of passing, the regression moved by `beyond` towards it."""
     one = there.mechanism.probability_of(there.latent + (beyond if passes == 1.0 else -np.asarray(beyond)))
     return one if passes == 1.0 else 1.0 - one
 
 
-def _probability_of(mechanism: Mechanism, bound: Threshold, after: _Next) -> FloatArray:
+def _probability_of(mechanism: Mechanism, bound: Threshold, after: _Next) -> Floats:
     # A bound that no value of the target can go below (a time of 0 s) lies infinitely far on a log scale.
     reachable = bound.bound > LEAST[mechanism.transform]
     limit = transformed(np.array(bound.bound), mechanism.transform) if reachable else np.array(-np.inf)

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from care_core.numbers import distinct
+from care_core.numbers import Floats, distinct
 from care_core.records import Record
 from care_core.variables import Role, Variable
 
-FloatArray = NDArray[np.float64]
 Direction = Literal["increasing", "decreasing", "optimum inside", "none"]
 
 NO_EFFECT = 1e-9
@@ -61,7 +60,7 @@ def average_causal_effect(response: ArrayLike, scale: float) -> Effect:
     return Effect(pair_sum / (m * (m - 1) / 2) / scale, _direction(values))
 
 
-def _direction(values: FloatArray) -> Direction:
+def _direction(values: Floats) -> Direction:
     ends = values[[0, -1]]
     bump = max(values.max() - ends.max(), ends.min() - values.min())
     if bump > BUMP * np.ptp(values):
@@ -77,7 +76,7 @@ def along(directions: Sequence[Direction]) -> Direction:
     return "decreasing" if directions.count("decreasing") % 2 else "increasing"
 
 
-def acceptable_values(variable: Variable, observed: ArrayLike, count: int = 9) -> FloatArray:
+def acceptable_values(variable: Variable, observed: ArrayLike, count: int = 9) -> Floats:
     """The values of a variable over which Eq. 1 averages, increasing and without repeats.
 
     An option: its codes, or its acceptable range in equal steps (equal ratios where log scaled), whole numbers for

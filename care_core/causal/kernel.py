@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.numbers import Floats
 from care_core.records import Record
 
-FloatArray = NDArray[np.float64]
 BLOCK = 300_000
 """Largest number of floats in one block of pairwise distances, which then stays in the processor's cache: changes no
 number."""
@@ -31,12 +31,12 @@ class UniqueValues(Record, eq=False):
         place: where in `values` each point's value stands, by column, shape (p, n).
     """
 
-    values: FloatArray
+    values: Floats
     column: NDArray[np.intp]
     place: NDArray[np.intp]
 
     @classmethod
-    def of(cls, points: FloatArray) -> UniqueValues:
+    def of(cls, points: Floats) -> UniqueValues:
         """Of points of shape (n, p)."""
         columns = points.T
         order = columns.argsort(axis=1)
@@ -48,11 +48,11 @@ class UniqueValues(Record, eq=False):
         return cls(ascending[is_new], is_new.nonzero()[0], place)
 
 
-def _unique(points: FloatArray | UniqueValues) -> UniqueValues:
+def _unique(points: Floats | UniqueValues) -> UniqueValues:
     return points if isinstance(points, UniqueValues) else UniqueValues.of(points)
 
 
-def _alike(a: FloatArray, b: FloatArray) -> FloatArray:
+def _alike(a: Floats, b: Floats) -> Floats:
     """e_j of scaled values, of the shape that both have together."""
     exponents = a - b
     np.multiply(exponents, exponents, out=exponents)
@@ -60,7 +60,7 @@ def _alike(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.exp(exponents, out=exponents))
 
 
-def _between(values: FloatArray, place: NDArray[np.intp]) -> Callable[[slice, slice], FloatArray]:
+def _between(values: Floats, place: NDArray[np.intp]) -> Callable[[slice, slice], Floats]:
     """e_j of two slices of n points, which stand at these places among the values: looked up where the values are so
     few that they have no more pairs than half of the points' own, which are asked for."""
     if 2 * len(values) > len(place):
@@ -73,14 +73,14 @@ def _between(values: FloatArray, place: NDArray[np.intp]) -> Callable[[slice, sl
 class Kernel(Record, eq=False):
     """The covariance above on scaled inputs. `relevance`: shape (p,); amplitudes, `noise`: standard deviations."""
 
-    relevance: FloatArray
+    relevance: Floats
     additive: float
     joint: float
     noise: float
     idle: int = 0
     """Inputs that were found to explain nothing and left out: each adds an e_j of 1."""
 
-    def __call__(self, a: FloatArray, b: FloatArray | UniqueValues) -> FloatArray:
+    def __call__(self, a: Floats, b: Floats | UniqueValues) -> Floats:
         """Covariance of the noise-free values. a: (m, p), b: (n, p) -> (m, n)."""
         points = _unique(b)
         rows = max(1, BLOCK // max(1, points.place.size))
@@ -89,7 +89,7 @@ class Kernel(Record, eq=False):
             covariance[i : i + rows] = self._block(a[i : i + rows], points).T
         return covariance
 
-    def among(self, points: FloatArray | UniqueValues) -> FloatArray:
+    def among(self, points: Floats | UniqueValues) -> Floats:
         """Covariance of n points with each other, shape (n, n): half the work of calling it, and the same numbers."""
         points = _unique(points)
         n = points.place.shape[1]
@@ -112,7 +112,7 @@ class Kernel(Record, eq=False):
             covariance[rows, i:] = covariance[i:, rows].T
         return covariance
 
-    def _block(self, a: FloatArray, points: UniqueValues) -> FloatArray:
+    def _block(self, a: Floats, points: UniqueValues) -> Floats:
         """Of n points with m others, a: (m, p) -> (n, m)."""
         scale = self._scale[points.column][:, None]
         alike = _alike(a.T[points.column] * scale, points.values[:, None] * scale)
@@ -125,10 +125,10 @@ class Kernel(Record, eq=False):
         return self._sum(joint, each)
 
     @property
-    def _scale(self) -> FloatArray:
+    def _scale(self) -> Floats:
         return np.asarray(self.relevance * np.sqrt(0.5))
 
-    def _sum(self, joint: FloatArray, each: FloatArray) -> FloatArray:
+    def _sum(self, joint: Floats, each: Floats) -> Floats:
         """The covariance of the product of all e_j and their sum, in the place of the first."""
         joint *= self.joint**2
         each *= self.additive**2 / max(1, len(self.relevance) + self.idle)
@@ -147,17 +147,17 @@ class Factor(Record, eq=False):
     numpy solves no triangular system, so the inverses of its blocks on the diagonal are kept beside it.
     """
 
-    lower: FloatArray
-    diagonal: tuple[FloatArray, ...]
+    lower: Floats
+    diagonal: tuple[Floats, ...]
 
     @classmethod
-    def of(cls, covariance: FloatArray) -> Factor:
+    def of(cls, covariance: Floats) -> Factor:
         """Of a positive definite matrix, shape (n, n)."""
-        lower: FloatArray = np.linalg.cholesky(covariance).astype(np.float64, copy=False)
+        lower: Floats = np.linalg.cholesky(covariance).astype(np.float64, copy=False)
         starts = range(0, len(lower), SLICE)
         return cls(lower, tuple(np.asarray(np.linalg.inv(lower[i : i + SLICE, i : i + SLICE])) for i in starts))
 
-    def whitened(self, rows: FloatArray) -> FloatArray:
+    def whitened(self, rows: Floats) -> Floats:
         """L^-1 of each row. rows: (m, n) -> (m, n)."""
         solved = np.empty_like(rows)
         for i, inverse in zip(range(0, len(self.lower), SLICE), self.diagonal, strict=True):

@@ -17,9 +17,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.causal.kernel import Factor, FloatArray, Kernel, UniqueValues
+from care_core.causal.kernel import Factor, Kernel, UniqueValues
 from care_core.causal.nominal import Nominal
-from care_core.numbers import logistic, quantile
+from care_core.numbers import Bools, Floats, logistic, quantile
 from care_core.records import Record
 
 Transform = Literal["identity", "log", "log1p"]
@@ -30,14 +30,14 @@ TAIL = 0.01
 """Probabilities are kept this far from 0 and 1: no table of a few hundred runs supports more."""
 
 
-def transformed(values: FloatArray, transform: Transform) -> FloatArray:
+def transformed(values: Floats, transform: Transform) -> Floats:
     """The scale on which a mechanism is additive in its noise."""
     if transform == "log":
         return np.log(values)
     return np.log1p(values) if transform == "log1p" else values
 
 
-def restored(values: FloatArray, transform: Transform) -> FloatArray:
+def restored(values: Floats, transform: Transform) -> Floats:
     """The inverse of `transformed`."""
     if transform == "log":
         return np.exp(values)
@@ -64,7 +64,7 @@ class TrainingRuns(Record, eq=False, dict=True):
     kernel: Kernel
     points: UniqueValues
     counts: NDArray[np.intp]
-    weights: FloatArray
+    weights: Floats
 
     @cached_property
     def factor(self) -> Factor:
@@ -97,27 +97,27 @@ class Mechanism(Record, eq=False, dict=True):
 
     inputs: tuple[str, ...]
     reads: NDArray[np.int64]
-    log_inputs: NDArray[np.bool_]
-    centre: FloatArray
-    sd: FloatArray
+    log_inputs: Bools
+    centre: Floats
+    sd: Floats
     kernel: Kernel
-    points: FloatArray
-    targets: FloatArray
-    weights: FloatArray
+    points: Floats
+    targets: Floats
+    weights: Floats
     mean: float
     scale: float
     transform: Transform
     binary: bool
-    calibration: FloatArray
+    calibration: Floats
     prior: tuple[Mechanism, float] | None = None
     nominal: Nominal | None = None
     averaging: Averaging | None = None
 
-    def scaled(self, x: FloatArray) -> FloatArray:
+    def scaled(self, x: Floats) -> Floats:
         """Inputs in their own units, shape (m, p), to the scale and the columns that the kernel sees, shape (m, q)."""
         x = x[:, self.reads]
         logs = np.log(np.where(self.log_inputs, np.maximum(x, 1e-12), 1.0))
-        scaled: FloatArray = (np.where(self.log_inputs, logs, x) - self.centre) / self.sd
+        scaled: Floats = (np.where(self.log_inputs, logs, x) - self.centre) / self.sd
         return scaled
 
     @cached_property
@@ -131,23 +131,23 @@ class Mechanism(Record, eq=False, dict=True):
         weights = np.bincount(place, self.weights).astype(np.float64)
         return TrainingRuns(self.kernel, UniqueValues.of(points), np.bincount(place), weights)
 
-    def posterior(self, x: FloatArray) -> Posterior:
+    def posterior(self, x: Floats) -> Posterior:
         """The mechanism at places x, shape (m, p)."""
         return Posterior(self, x)
 
-    def latent(self, x: FloatArray) -> FloatArray:
+    def latent(self, x: Floats) -> Floats:
         """Posterior mean on the transformed scale. x: (m, p) -> (m,)."""
         return self.posterior(x).latent
 
-    def latent_sd(self, x: FloatArray) -> FloatArray:
+    def latent_sd(self, x: Floats) -> Floats:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
         return self.posterior(x).latent_sd
 
-    def known(self, x: FloatArray) -> FloatArray:
+    def known(self, x: Floats) -> Floats:
         """What physics and the other platform's mechanism say, shape (m,); zero without either."""
         return self.posterior(x).known
 
-    def active_inputs(self, x: FloatArray) -> list[bytes]:
+    def active_inputs(self, x: Floats) -> list[bytes]:
         """Of each row of x (m, p) the values of the inputs that anything reads: rows with the same have one answer."""
         return [row.tobytes() for row in x[:, self._active]]
 
@@ -159,7 +159,7 @@ class Mechanism(Record, eq=False, dict=True):
         names.update(() if self.prior is None else self.prior[0].inputs)
         return np.array([place for place, name in enumerate(self.inputs) if name in names], dtype=np.int64)
 
-    def columns(self, x: FloatArray, names: Sequence[str]) -> FloatArray:
+    def columns(self, x: Floats, names: Sequence[str]) -> Floats:
         """Those of the inputs, of x (m, p)."""
         return x[:, [self.inputs.index(name) for name in names]]
 
@@ -174,7 +174,7 @@ class Mechanism(Record, eq=False, dict=True):
         """Standard deviation of a training run around the mechanism, on the transformed scale."""
         return self.scale * self.kernel.noise
 
-    def noise_at(self, x: FloatArray) -> FloatArray:
+    def noise_at(self, x: Floats) -> Floats:
         """The same for missions of any number of parts, shape (m,)."""
         if self.averaging is None:
             return np.full(len(x), self.noise_sd)
@@ -182,16 +182,16 @@ class Mechanism(Record, eq=False, dict=True):
         share = self.averaging.share
         return np.asarray(self.noise_sd * np.sqrt(1 - share + share * self.averaging.usual / parts))
 
-    def probability(self, x: FloatArray) -> FloatArray:
+    def probability(self, x: Floats) -> Floats:
         """Binary targets: probability of 1, shape (m,)."""
         return self.probability_of(self.latent(x))
 
-    def probability_of(self, latent: FloatArray) -> FloatArray:
+    def probability_of(self, latent: Floats) -> Floats:
         """Binary targets: probability of 1 for values of the regression, of any shape."""
         slope, offset = self.calibration
         return np.clip(logistic(slope * latent + offset), TAIL, 1 - TAIL)
 
-    def share_below(self, z: FloatArray) -> FloatArray:
+    def share_below(self, z: Floats) -> Floats:
         """Continuous targets: distribution function of the standardised error, kept off 0 and 1."""
         levels = (np.arange(len(self.calibration)) + 0.5) / len(self.calibration)
         return np.clip(np.interp(z, self.calibration, levels, left=0.0, right=1.0), TAIL, 1 - TAIL)
@@ -206,7 +206,7 @@ class Mechanism(Record, eq=False, dict=True):
     def _quantiles(self) -> dict[float, float]:
         return {}
 
-    def residual_share(self, x: FloatArray, value: float) -> tuple[float, float]:
+    def residual_share(self, x: Floats, value: float) -> tuple[float, float]:
         """Continuous targets: the share of training runs whose error lies below that of `value` at one place, and what
         was expected there. x: (1, p). An error that no training run had is 0 or 1."""
         if value <= LEAST[self.transform]:
@@ -217,7 +217,7 @@ class Mechanism(Record, eq=False, dict=True):
         share = np.searchsorted(self.calibration, z)[0] / len(self.calibration)
         return float(share), float(restored(there.latent, self.transform)[0])
 
-    def expected(self, x: FloatArray) -> FloatArray:
+    def expected(self, x: Floats) -> Floats:
         """Expected value in the target's own unit; the probability of 1 for binary targets."""
         return self.probability(x) if self.binary else restored(self.latent(x), self.transform)
 
@@ -227,36 +227,36 @@ class Posterior(Record, eq=False, dict=True):
     them, and nothing before it is needed."""
 
     mechanism: Mechanism
-    x: FloatArray
+    x: Floats
 
     @cached_property
-    def latent(self) -> FloatArray:
+    def latent(self) -> Floats:
         """Posterior mean on the transformed scale, shape (m,)."""
         m = self.mechanism
-        mean: FloatArray = m.mean + m.scale * (self._cross @ m.training.weights)
+        mean: Floats = m.mean + m.scale * (self._cross @ m.training.weights)
         return mean + self.known
 
     @cached_property
-    def latent_sd(self) -> FloatArray:
+    def latent_sd(self) -> Floats:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
         return np.sqrt(self.variance)
 
     @cached_property
-    def variance(self) -> FloatArray:
+    def variance(self) -> Floats:
         """Its square, shape (m,)."""
         m = self.mechanism
-        own: FloatArray = m.scale**2 * np.maximum(m.kernel.variance - (self.half**2).sum(axis=1), 1e-12)
+        own: Floats = m.scale**2 * np.maximum(m.kernel.variance - (self.half**2).sum(axis=1), 1e-12)
         return own if self._prior is None else own + self._prior[1] ** 2 * self._prior[0].variance
 
     @property
-    def epistemic_ratio(self) -> FloatArray:
+    def epistemic_ratio(self) -> Floats:
         """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known).
 
         Shape (m,)."""
         return np.clip(self.variance / max(self.mechanism.prior_variance, 1e-12), 0.0, 1.0)
 
     @cached_property
-    def known(self) -> FloatArray:
+    def known(self) -> Floats:
         """What physics and the other platform's mechanism say, shape (m,); zero without either."""
         latent, physics = np.zeros(len(self.x)), self.mechanism.nominal
         if physics is not None:
@@ -265,7 +265,7 @@ class Posterior(Record, eq=False, dict=True):
             latent += self._prior[1] * self._prior[0].latent
         return latent
 
-    def change_sd(self, here: Posterior) -> FloatArray:
+    def change_sd(self, here: Posterior) -> Floats:
         """Posterior standard deviation of f(x) - f(here), shape (m,); `here` is one place.
 
         What is not known at both places cancels, so a small change is known better than either value.
@@ -273,34 +273,34 @@ class Posterior(Record, eq=False, dict=True):
         m = self.mechanism
         prior = 2 * (m.kernel.variance - m.kernel(self._z, here._z)[:, 0])
         explained = ((self.half - here.half) ** 2).sum(axis=1)
-        sd: FloatArray = m.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
+        sd: Floats = m.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
         if self._prior is None or here._prior is None:
             return sd
         return np.hypot(sd, self._prior[1] * self._prior[0].change_sd(here._prior[0]))
 
-    def covariance(self, here: Posterior) -> FloatArray:
+    def covariance(self, here: Posterior) -> Floats:
         """Posterior covariance of the noise-free values with that of one place, shape (m,).
 
         What is not known of the mechanism at one place is partly what is not known at the other.
         """
         m = self.mechanism
         between = m.kernel(self._z, here._z)[:, 0]
-        own: FloatArray = m.scale**2 * (between - self.half @ here.half[0])
+        own: Floats = m.scale**2 * (between - self.half @ here.half[0])
         if self._prior is None or here._prior is None:
             return own
         return own + self._prior[1] ** 2 * self._prior[0].covariance(here._prior[0])
 
     @cached_property
-    def _z(self) -> FloatArray:
+    def _z(self) -> Floats:
         return self.mechanism.scaled(self.x)
 
     @cached_property
-    def _cross(self) -> FloatArray:
+    def _cross(self) -> Floats:
         """Covariances with the training runs, shape (m, u)."""
         return self.mechanism.kernel(self._z, self.mechanism.training.points)
 
     @cached_property
-    def half(self) -> FloatArray:
+    def half(self) -> Floats:
         """The same, whitened: products of its rows are covariances that the training runs explain."""
         return self.mechanism.training.factor.whitened(self._cross)
 
@@ -313,12 +313,12 @@ class Posterior(Record, eq=False, dict=True):
         return source.posterior(self.mechanism.columns(self.x, source.inputs)), share
 
 
-def solve(kernel: Kernel, points: FloatArray, targets: FloatArray) -> FloatArray:
+def solve(kernel: Kernel, points: Floats, targets: Floats) -> Floats:
     """Weights of the posterior mean, shape (n,), for scaled points (n, p) and targets (n,)."""
     covariance = kernel.among(points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
     return np.asarray(np.linalg.solve(covariance, targets))
 
 
-def columns(rows: Sequence[Mapping[str, float]], names: Sequence[str]) -> FloatArray:
+def columns(rows: Sequence[Mapping[str, float]], names: Sequence[str]) -> Floats:
     """Configurations as a matrix, shape (len(rows), len(names))."""
     return np.array([[row[name] for name in names] for row in rows], dtype=float).reshape(len(rows), len(names))

@@ -12,8 +12,8 @@ import numpy as np
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import TAIL, Mechanism, columns
+from care_core.numbers import Floats
 from care_core.records import Record, field, replace
 from care_core.variables import Threshold
 
@@ -198,7 +198,7 @@ class NoiseCarryOver(Record, kw_only=True):
     another: float
     pairs: tuple[int, int] = (0, 0)
 
-    def shares(self, *, same: bool) -> tuple[FloatArray, FloatArray]:
+    def shares(self, *, same: bool) -> tuple[Floats, Floats]:
         """Shares that it may be, and how likely each is: a beta distribution around the mean, as wide as the pairs
         leave it. Without any pair under the same conditions each is as likely as the next.
 

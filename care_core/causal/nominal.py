@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from care_core.numbers import Floats
 from care_core.records import Record
 
-FloatArray = NDArray[np.float64]
-Given = Mapping[str, FloatArray]
+Given = Mapping[str, Floats]
 """Arguments of a formula by their names, each of shape (n,)."""
 
 GRAVITY = 9.81
@@ -35,7 +34,7 @@ class Formula(Record):
     """A formula and the names of its arguments."""
 
     arguments: tuple[str, ...]
-    compute: Callable[[Given], FloatArray]
+    compute: Callable[[Given], Floats]
 
 
 FORMULAS: dict[str, Formula] = {}
@@ -48,7 +47,7 @@ class Nominal(Record):
     inputs: tuple[str, ...]
     scales: tuple[float, ...]
 
-    def of(self, columns: FloatArray) -> FloatArray:
+    def of(self, columns: Floats) -> Floats:
         """The nominal value of each run, above 0. columns: shape (n, len(inputs)) in the variables' own units."""
         formula = FORMULAS[self.kind]
         scaled = columns * np.array(self.scales)
@@ -80,10 +79,10 @@ def nominal(kind: str, given: Mapping[str, str], units: Mapping[str, str]) -> No
     return Nominal(kind, inputs, tuple(SCALES.get(units[name], 1.0) for name in inputs))
 
 
-def formula(*arguments: str) -> Callable[[Callable[[Given], FloatArray]], Callable[[Given], FloatArray]]:
+def formula(*arguments: str) -> Callable[[Callable[[Given], Floats]], Callable[[Given], Floats]]:
     """Register a function under its own name."""
 
-    def register(compute: Callable[[Given], FloatArray]) -> Callable[[Given], FloatArray]:
+    def register(compute: Callable[[Given], Floats]) -> Callable[[Given], Floats]:
         FORMULAS[compute.__name__] = Formula(arguments, compute)
         return compute
 
@@ -104,13 +103,13 @@ _MISSION = tuple(dict.fromkeys((*_CRUISE, "hold_time", *_TAKEOFF, *_END, *_LIMIT
 
 
 @formula(*_TAKEOFF)
-def multicopter_takeoff_time(given: Given) -> FloatArray:
+def multicopter_takeoff_time(given: Given) -> Floats:
     """Arming to the first leg."""
     return _ARMING_S + _rise_time(given["takeoff_height"], given["climb_speed"])
 
 
 @formula(*_CRUISE)
-def multicopter_cruise_time(given: Given) -> FloatArray:
+def multicopter_cruise_time(given: Given) -> Floats:
     """All legs without the waits at their ends.
 
     Each leg starts and ends at rest. Where nobody waits, the next leg begins before the last one ends: as early as the
@@ -136,19 +135,19 @@ def multicopter_cruise_time(given: Given) -> FloatArray:
     return np.asarray(time - given["flown_corners"] * np.minimum(overlap, ramps / count))
 
 
-def _two_lengths(mean: FloatArray, variation: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _two_lengths(mean: Floats, variation: Floats) -> tuple[Floats, Floats]:
     """Two lengths that stand for all legs: they have their mean and their variation."""
     return np.maximum(mean * (1 - variation), 1.0), np.maximum(mean * (1 + variation), 1.0)
 
 
 @formula(*_CRUISE)
-def multicopter_cruise_speed(given: Given) -> FloatArray:
+def multicopter_cruise_speed(given: Given) -> Floats:
     """Length of the legs over the time for them."""
     return np.asarray(given["path_length"] / np.maximum(multicopter_cruise_time(given), _TINY))
 
 
 @formula(*_END, *_LIMITS, "climb_speed")
-def multicopter_return_time(given: Given) -> FloatArray:
+def multicopter_return_time(given: Given) -> Floats:
     """From the last waypoint to above home: up, over, and the wait there. Nothing where the mission ends elsewhere."""
     way = np.maximum(given["return_distance"], 1.0)
     peak, ramp = _ramps(way, given["speed"], _within_lean(given), given["jerk"], _lag(given))
@@ -158,20 +157,20 @@ def multicopter_return_time(given: Given) -> FloatArray:
 
 
 @formula(*_END, "descent_speed")
-def multicopter_descent_time(given: Given) -> FloatArray:
+def multicopter_descent_time(given: Given) -> Floats:
     """From the height of the return, or of the last waypoint, to where a landing slows down."""
     return _STILL_S + _rise_time(_return_height(given) - _LAND_LOW_M, given["descent_speed"])
 
 
 @formula(*_END, "landing_speed")
-def multicopter_landing_time(given: Given) -> FloatArray:
+def multicopter_landing_time(given: Given) -> Floats:
     """The slow last metres, to disarming."""
     slow = np.minimum(_return_height(given), _LAND_LOW_M)
     return np.asarray(slow / np.maximum(given["landing_speed"], _TINY) + _LANDED_S)
 
 
 @formula(*_MISSION)
-def multicopter_mission_time(given: Given) -> FloatArray:
+def multicopter_mission_time(given: Given) -> Floats:
     """Arming to disarming: the phases one after the other."""
     phases = (
         multicopter_takeoff_time, multicopter_cruise_time, multicopter_return_time, multicopter_descent_time,
@@ -181,37 +180,37 @@ def multicopter_mission_time(given: Given) -> FloatArray:
 
 
 @formula(*_MISSION, "hover_power")
-def multicopter_energy(given: Given) -> FloatArray:
+def multicopter_energy(given: Given) -> Floats:
     """Wh: the power that keeps the vehicle in the air, all the time."""
     return np.asarray(given["hover_power"] * multicopter_mission_time(given) / 3600)
 
 
 @formula("motor_output")
-def multicopter_hover_power(given: Given) -> FloatArray:
+def multicopter_hover_power(given: Given) -> Floats:
     """W: what the multicopters of the training took to stay up, by the mean output of their motors (342 flights of
     seven vehicles, 0.73 to 1.36 times this)."""
     return np.asarray(570.0 * np.maximum(given["motor_output"], _TINY) ** 1.16)
 
 
-def _lag(given: Given) -> FloatArray:
+def _lag(given: Given) -> Floats:
     """What the limit of the jerk's change adds to speeding up and slowing down (WPNav: snap by the response time)."""
     return np.asarray(2 * np.maximum(given["response"], 0.1))
 
 
-def _within_lean(given: Given) -> FloatArray:
+def _within_lean(given: Given) -> Floats:
     """The wanted acceleration, but no more than two thirds of what the largest lean gives: the rest holds the wind."""
     lean = np.radians(np.clip(given["lean_limit"], 5.0, 60.0))
     return np.minimum(given["acceleration"], GRAVITY * np.tan(lean) * 2 / 3)
 
 
-def _return_height(given: Given) -> FloatArray:
+def _return_height(given: Given) -> Floats:
     """Height of the way home: no higher than needed near home, never lower than the last waypoint."""
     last = given["end_height"]
     high = np.maximum(last, np.minimum(given["return_height"], _CONE * given["return_distance"]))
     return np.where(given["returns"] > 0, high, last)
 
 
-def _rise_time(height: FloatArray, speed: FloatArray) -> FloatArray:
+def _rise_time(height: Floats, speed: Floats) -> Floats:
     """Time up or down a height from rest to rest; 0 where there is none."""
     way = np.maximum(height, _TINY)
     peak, ramp = _ramps(way, speed, np.full_like(way, _RISE_ACCELERATION), np.full_like(way, _RISE_JERK), 0.0)
@@ -219,8 +218,8 @@ def _rise_time(height: FloatArray, speed: FloatArray) -> FloatArray:
 
 
 def _ramps(
-    way: FloatArray, speed: FloatArray, acceleration: FloatArray, jerk: FloatArray, lag: FloatArray | float
-) -> tuple[FloatArray, FloatArray]:
+    way: Floats, speed: Floats, acceleration: Floats, jerk: Floats, lag: Floats | float
+) -> tuple[Floats, Floats]:
     """Top speed on a way from rest to rest, and the time that speeding up and slowing down add to `way / speed`."""
     bend = acceleration**2 / jerk  # below this speed the largest acceleration is never reached
     with_plateau = (-bend + np.sqrt(bend**2 + 4 * acceleration * way)) / 2
@@ -231,9 +230,9 @@ def _ramps(
 
 
 def _blend(
-    radius: FloatArray, turn_deg: FloatArray, top: FloatArray, acceleration: FloatArray, jerk: FloatArray,
-    corner: FloatArray,
-) -> FloatArray:  # fmt: skip
+    radius: Floats, turn_deg: Floats, top: Floats, acceleration: Floats, jerk: Floats,
+    corner: Floats,
+) -> Floats:  # fmt: skip
     """How long before a corner the next leg may begin, halved: the corner stays within the radius, the vehicle within
     its speed and the acceleration that it may have in a corner."""
     aside = np.maximum(2 * np.sin(np.radians(turn_deg) / 2), 0.05)
@@ -267,7 +266,7 @@ _POSITION_M, _RESPONSE_S, _SKID_S, _TURN_RAD = 0.55, 0.27, 0.18, 0.18
 
 
 @formula(*_DRIVE)
-def drive_cruise_time(given: Given) -> FloatArray:
+def drive_cruise_time(given: Given) -> Floats:
     """All legs of a rover without the waits at their ends.
 
     Speeding up and slowing down share the smaller of both limits, and the jerk is as large as it (AR_WPNav::init). A
@@ -288,7 +287,7 @@ def drive_cruise_time(given: Given) -> FloatArray:
     return np.asarray(time + pivots - through * np.minimum(overlap, ramps / count))
 
 
-def _drive_speed(given: Given) -> FloatArray:
+def _drive_speed(given: Given) -> Floats:
     """The speed that is asked for, as far as the throttle gives it."""
     wanted = np.where(given["commanded_speed"] > 0, given["commanded_speed"], given["speed"])
     throttle = np.clip(given["throttle_limit"], _LEAST_THROTTLE, 100.0) / 100.0
@@ -296,26 +295,26 @@ def _drive_speed(given: Given) -> FloatArray:
     return np.asarray(np.minimum(wanted, most))
 
 
-def _drive_acceleration(given: Given) -> FloatArray:
+def _drive_acceleration(given: Given) -> Floats:
     """The smaller of both limits, each of which may be none."""
     faster = np.where(given["acceleration"] > 0, given["acceleration"], _NO_LIMIT)
     return np.asarray(np.where(given["deceleration"] > 0, np.minimum(faster, given["deceleration"]), faster))
 
 
 @formula(*_DRIVE)
-def drive_cruise_speed(given: Given) -> FloatArray:
+def drive_cruise_speed(given: Given) -> Floats:
     """Length of the legs over the time for them."""
     return np.asarray(given["path_length"] / np.maximum(drive_cruise_time(given), _TINY))
 
 
 @formula(*_DRIVE, "hold_time")
-def drive_mission_time(given: Given) -> FloatArray:
+def drive_mission_time(given: Given) -> Floats:
     """The legs and the waits at their ends."""
     return np.asarray(given["hold_time"] + drive_cruise_time(given))
 
 
 @formula(*_DRIVE)
-def drive_path_error(given: Given) -> FloatArray:
+def drive_path_error(given: Given) -> Floats:
     """Largest distance from the legs: how far a rover gets while its steering responds and turns as fast as it may."""
     leg = given["path_length"] / np.maximum(given["legs"], 1)
     fastest = np.minimum(_drive_speed(given), np.sqrt(_drive_acceleration(given) * leg))
@@ -324,20 +323,20 @@ def drive_path_error(given: Given) -> FloatArray:
 
 
 @formula("path_length", "energy_per_metre")
-def drive_energy(given: Given) -> FloatArray:
+def drive_energy(given: Given) -> Floats:
     """Wh: what each metre takes, all the way."""
     return np.asarray(given["energy_per_metre"] * given["path_length"] / 3600)
 
 
 @formula("steering_kind")
-def drive_energy_per_metre(given: Given) -> FloatArray:
+def drive_energy_per_metre(given: Given) -> Floats:
     """J/m: what the rovers of the training took, with steered wheels and with sides that are driven apart (218 drives,
     99 of 100 of them 0.97 to 1.4 times this)."""
     return np.where(given["steering_kind"] > 0, 150.0, 31.3)
 
 
 @formula("steering_kind")
-def drive_full_throttle_speed(given: Given) -> FloatArray:
+def drive_full_throttle_speed(given: Given) -> Floats:
     """m/s: how fast the rovers of the training were for their throttle (95 of 100 at least 0.97 times this)."""
     return np.where(given["steering_kind"] > 0, 4.0, 19.6)
 
@@ -351,7 +350,7 @@ _PLANE_ENDS_S = 30.0
 
 
 @formula(*_PLANE)
-def plane_airspeed(given: Given) -> FloatArray:
+def plane_airspeed(given: Given) -> Floats:
     """The airspeed that is asked for, by the mission or else the parameter: no less than the least, no more than the
     largest."""
     wanted = np.where(given["commanded_speed"] > 0, given["commanded_speed"], given["speed"])
@@ -359,7 +358,7 @@ def plane_airspeed(given: Given) -> FloatArray:
 
 
 @formula(*_PLANE_MISSION)
-def plane_mission_time(given: Given) -> FloatArray:
+def plane_mission_time(given: Given) -> Floats:
     """Arming to disarming: the legs, the way home and the circles at the wanted airspeed, without wind."""
     circles = given["loiter_turns"] * 2 * np.pi * np.abs(given["loiter_radius"])
     way = given["path_length"] + circles + given["returns"] * given["return_distance"]
@@ -367,7 +366,7 @@ def plane_mission_time(given: Given) -> FloatArray:
 
 
 @formula(*_PLANE_MISSION, "level_power")
-def plane_energy(given: Given) -> FloatArray:
+def plane_energy(given: Given) -> Floats:
     """Wh: the power of level flight, which grows with the cube of the airspeed, all the time."""
     power = given["level_power"] * (plane_airspeed(given) / _POWER_AT_MS) ** 3
     return np.asarray(power * plane_mission_time(given) / 3600)
@@ -381,7 +380,7 @@ _LEVEL_ERROR_M, _LAGS, _CORNER, _DAMPING, _OFF_A_CIRCLE = 1.6, 0.25, 0.38, 0.75,
 
 
 @formula(*_PLANE, "rises", "legs_length", "climb_rate")
-def plane_height_error(given: Given) -> FloatArray:
+def plane_height_error(given: Given) -> Floats:
     """Mean height error on the legs: a leg that leads up is flown below it until the climb is done."""
     flown_s = given["legs_length"] / np.maximum(plane_airspeed(given), 1.0)
     behind = _LAGS * given["rises"] / np.maximum(given["climb_rate"], 0.1)
@@ -389,7 +388,7 @@ def plane_height_error(given: Given) -> FloatArray:
 
 
 @formula(*_PLANE, "period", "loiter_radius", "leg_after_loiter")
-def plane_path_error(given: Given) -> FloatArray:
+def plane_path_error(given: Given) -> Floats:
     """Largest distance from the legs: corners lead off by a share of the length of the guidance, and a leg that follows
     a circle begins as far off as the circle is wide."""
     guidance = given["period"] * _DAMPING * plane_airspeed(given) / np.pi
@@ -405,7 +404,7 @@ _LEG_S = 3.0
 
 
 @formula(*_DIVE)
-def dive_mission_time(given: Given) -> FloatArray:
+def dive_mission_time(given: Given) -> Floats:
     """The legs of a submarine, each as long as its way or its change of depth takes, and the waits at their ends."""
     over = given["path_length"] / np.maximum(given["speed"], _TINY)
     up = given["climb"] / np.maximum(given["climb_speed"], _TINY)
@@ -431,13 +430,13 @@ _PX4_MISSION = tuple(
 
 
 @formula(*_PX4_TAKEOFF)
-def px4_takeoff_time(given: Given) -> FloatArray:
+def px4_takeoff_time(given: Given) -> Floats:
     """Arming to the first leg."""
     return _SPOOL_S + _rise_time(given["takeoff_height"], np.minimum(given["takeoff_speed"], given["climb_speed"]))
 
 
 @formula(*_PX4_CRUISE)
-def px4_cruise_time(given: Given) -> FloatArray:
+def px4_cruise_time(given: Given) -> Floats:
     """All legs without the waits at their ends. A corner without a wait is flown through at the speed that keeps the
     acceleration within a circle of the acceptance radius (PX4: PositionSmoothing, computeMaxSpeedInWaypoint)."""
     wanted = np.where(given["commanded_speed"] > 0, given["commanded_speed"], given["speed"])
@@ -462,13 +461,13 @@ def px4_cruise_time(given: Given) -> FloatArray:
 
 
 @formula(*_PX4_CRUISE)
-def px4_cruise_speed(given: Given) -> FloatArray:
+def px4_cruise_speed(given: Given) -> Floats:
     """Length of the legs over the time for them."""
     return np.asarray(given["path_length"] / np.maximum(px4_cruise_time(given), _TINY))
 
 
 @formula(*_PX4_RETURN)
-def px4_return_time(given: Given) -> FloatArray:
+def px4_return_time(given: Given) -> Floats:
     """From the last waypoint to above home: up and over. Nothing where the mission ends elsewhere."""
     way = np.maximum(given["return_distance"], 1.0)
     peak, ramp = _ramps(way, np.minimum(given["speed"], given["fastest"]), _within_lean(given), given["jerk"], 0.0)
@@ -478,7 +477,7 @@ def px4_return_time(given: Given) -> FloatArray:
 
 
 @formula(*_PX4_DESCENT)
-def px4_descent_time(given: Given) -> FloatArray:
+def px4_descent_time(given: Given) -> Floats:
     """From the height of the return, or of the last waypoint, to where a landing is slow, with the wait on the way."""
     high = _px4_return_height(given)
     slows = np.minimum(high, _SLOWS_FROM_M)
@@ -489,26 +488,26 @@ def px4_descent_time(given: Given) -> FloatArray:
 
 
 @formula(*_PX4_LANDING)
-def px4_landing_time(given: Given) -> FloatArray:
+def px4_landing_time(given: Given) -> Floats:
     """The slow last metres, to disarming."""
     down = _SLOW_BELOW_M / np.maximum(given["landing_speed"], _TINY)
     return np.asarray(down + given["detection_time"] + given["disarm_time"])
 
 
 @formula(*_PX4_MISSION)
-def px4_mission_time(given: Given) -> FloatArray:
+def px4_mission_time(given: Given) -> Floats:
     """Arming to disarming: the phases one after the other."""
     phases = (px4_takeoff_time, px4_cruise_time, px4_return_time, px4_descent_time, px4_landing_time)
     return np.asarray(given["hold_time"] + sum(phase(given) for phase in phases))
 
 
 @formula(*_PX4_MISSION, "hover_power")
-def px4_energy(given: Given) -> FloatArray:
+def px4_energy(given: Given) -> Floats:
     """Wh: the power that keeps the vehicle in the air, all the time."""
     return np.asarray(given["hover_power"] * px4_mission_time(given) / 3600)
 
 
-def _px4_return_height(given: Given) -> FloatArray:
+def _px4_return_height(given: Given) -> Floats:
     """Height of the way home; near home a vehicle climbs no higher than its descent begins."""
     last = given["end_height"]
     near = given["return_distance"] < _NEAR_HOME_M
@@ -530,12 +529,12 @@ _GOALS = ("goals", "distance", "turn")
 
 
 @formula(*_GOALS)
-def goals_time(given: Given) -> FloatArray:
+def goals_time(given: Given) -> Floats:
     """First goal sent to last answer, from the distance (m) and turning (rad) for each goal."""
     return np.asarray(given["goals"] * (_GOAL_S + _METRE_S * given["distance"] + _RADIAN_S * given["turn"]))
 
 
 @formula(*_GOALS)
-def goals_energy(given: Given) -> FloatArray:
+def goals_energy(given: Given) -> Floats:
     """Wh: the same power all the time."""
     return np.asarray(_DRIVE_W * goals_time(given) / 3600)

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import Mechanism, Posterior
+from care_core.numbers import Floats
 
 MOST = 256
 """Configurations of one mechanism that are kept: each takes two numbers a training run."""
@@ -24,7 +24,7 @@ class PosteriorCache:
     def __init__(self) -> None:
         self._rows: dict[Mechanism, dict[bytes, _Row]] = {}
 
-    def at(self, mechanism: Mechanism, x: FloatArray) -> Posterior:
+    def at(self, mechanism: Mechanism, x: Floats) -> Posterior:
         """The posterior at inputs x, shape (m, p); only the rows that are new are worked out."""
         cached = self._rows.setdefault(mechanism, {})
         inputs = mechanism.active_inputs(x)
@@ -44,17 +44,17 @@ class _CachedPosterior(Posterior, eq=False, dict=True):
     rows: Sequence[_Row]
 
     @cached_property
-    def latent(self) -> FloatArray:
+    def latent(self) -> Floats:
         return _stacked(posterior.latent[i] for posterior, i in self.rows)
 
     @cached_property
-    def variance(self) -> FloatArray:
+    def variance(self) -> Floats:
         return _stacked(posterior.variance[i] for posterior, i in self.rows)
 
     @cached_property
-    def half(self) -> FloatArray:
+    def half(self) -> Floats:
         return _stacked(posterior.half[i] for posterior, i in self.rows)
 
 
-def _stacked(rows: Iterable[FloatArray]) -> FloatArray:
+def _stacked(rows: Iterable[Floats]) -> Floats:
     return np.array(list(rows))

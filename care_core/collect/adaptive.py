@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from care_core.collect.sampling import points
-from care_core.collect.space import Config, Floats, Space
+from care_core.collect.space import Config, Space
 from care_core.errors import UsageError
 from care_core.extras import install_hint
+from care_core.numbers import Floats
 from care_core.records import Record
 
 CANDIDATES = 384

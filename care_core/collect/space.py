@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from care_core.constraints import Constraint
 from care_core.errors import UsageError
+from care_core.numbers import Floats
 from care_core.records import Record
 from care_core.variables import Variable
 
-Floats = NDArray[np.float64]
 Config = Mapping[str, float]
 
 _DIGITS = 4

@@ -6,10 +6,10 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import islice, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.diagnose.records import Fix, Prediction
+from care_core.numbers import Bools
 from care_core.records import replace
 from care_core.variables import Change, Role, Variable
 
@@ -118,7 +118,7 @@ def settled(query: CounterfactualQuery, assignment: Assignment) -> tuple[Assignm
     return chosen, float(query.probability([{**query.config, **chosen}])[0])
 
 
-def _edge(does: NDArray[np.bool_]) -> int:
+def _edge(does: Bools) -> int:
     """Place of the last value but one, from the reference on, up to which all do; 0 where there are fewer."""
     return max(0, int(np.argmin(np.append(does, False))) - 2)
 

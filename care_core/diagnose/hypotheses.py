@@ -19,7 +19,6 @@ from types import MappingProxyType
 import numpy as np
 
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.causal.kernel import FloatArray
 from care_core.causal.model import ReferenceRuns
 from care_core.diagnose.estimates import (
     BY_CHANCE_REFUSED,
@@ -44,6 +43,7 @@ from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.explains import EXPLAINS
 from care_core.ecosystems.findings import BATTERY_FAILSAFE, SAGS, Finding, Severity, SuspectKind
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.run import Evidence, FitVerdict
@@ -199,7 +199,7 @@ def _lost_by_options(before: CounterfactualQuery, broken: Sequence[str]) -> tupl
     return dict(zip(off, map(float, lost), strict=True)), _chance(1.0 - float(kept[1]), before.model.training.reference)
 
 
-def _kept(before: CounterfactualQuery, broken: Sequence[str], configs: Sequence[Mapping[str, float]]) -> FloatArray:
+def _kept(before: CounterfactualQuery, broken: Sequence[str], configs: Sequence[Mapping[str, float]]) -> Floats:
     """Probability that what broke is kept, shape (m,), off 0; a coin's toss where training had too few runs to say."""
     odds = before.all_kept([name for name in broken if name in before.model.outcomes], configs)
     return np.full(len(configs), 0.5) if odds is None else np.clip(odds, 1e-4, 1.0)

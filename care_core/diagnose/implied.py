@@ -10,9 +10,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import LEAST, Mechanism, columns, transformed
 from care_core.causal.model import Model
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.run import Run, is_known
@@ -90,7 +90,7 @@ def _spoken_for(
             yield float(abs(off)), Implied(option, value, metric, seen, expected)
 
 
-def _off(mechanism: Mechanism, seen: float, configs: Sequence[Mapping[str, float]]) -> FloatArray:
+def _off(mechanism: Mechanism, seen: float, configs: Sequence[Mapping[str, float]]) -> Floats:
     """How far a value is from what each configuration gives, in standard deviations of single runs; shape (m,)."""
     x = columns(configs, mechanism.inputs)
     there = mechanism.posterior(x)

@@ -14,11 +14,10 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
-from care_core.causal.kernel import FloatArray
 from care_core.configs.driven import same_value
 from care_core.diagnose.estimates import BY_CAUSES
 from care_core.diagnose.noisy_or import CHANCE, Key, NoisyOr
-from care_core.numbers import logistic, logit
+from care_core.numbers import Floats, logistic, logit
 from care_core.records import Record
 
 SURE = 0.002
@@ -33,7 +32,7 @@ class Promise(Record, eq=False):
     broken: Sequence[str]
     """The objectives that it missed."""
 
-    def odds(self, configs: Sequence[Config]) -> FloatArray:
+    def odds(self, configs: Sequence[Config]) -> Floats:
         """Probability that every objective is met under each configuration, shape (m,): no more than what is left of
         this run's failure once what a change does not touch is counted, and than what the changed causes explain."""
         gone = [self._changed(config) for config in configs]
@@ -82,14 +81,14 @@ class Promise(Record, eq=False):
         is_past = (value - reference) * (driven - reference) < 0
         return is_past or option.distance(value, reference) < option.distance(driven, reference)
 
-    def _pooled(self, configs: Sequence[Config], gone: Sequence[frozenset[Key]]) -> FloatArray:
+    def _pooled(self, configs: Sequence[Config], gone: Sequence[frozenset[Key]]) -> Floats:
         options = {("parameter", name) for name in self.query.config}
         untouched = [key for key in self.failure.loses if key not in options and key != CHANCE]
         mechanisms = self.query.probability(configs) * (1.0 - self.failure.acts_among(untouched))
         causes = np.array([self.failure.repaired(keys) for keys in gone]) * self._others_kept(configs)
         return logistic((1.0 - BY_CAUSES.value) * logit(mechanisms, SURE) + BY_CAUSES.value * logit(causes, SURE))
 
-    def _others_kept(self, configs: Sequence[Config]) -> FloatArray:
+    def _others_kept(self, configs: Sequence[Config]) -> Floats:
         """Probability that the objectives which this run did not miss are met."""
         kept = self.query.all_kept([name for name in self.query.model.outcomes if name not in self.broken], configs)
         return np.ones(len(configs)) if kept is None else kept

@@ -8,10 +8,10 @@ from itertools import combinations
 import numpy as np
 
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.causal.kernel import FloatArray
 from care_core.diagnose.fixes import candidate_values
 from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Experiment, Fault
+from care_core.numbers import Floats
 from care_core.records import Record, replace
 from care_core.run import Run, Unavailable
 from care_core.text import percent
@@ -143,7 +143,7 @@ def _separating(query: CounterfactualQuery, objective: str, pair: tuple[str, str
 
 def _probability_if(
     query: CounterfactualQuery, objective: str, cause: str, pair: tuple[str, str], changes: Sequence[tuple[str, float]]
-) -> FloatArray:
+) -> Floats:
     """Probability of a good outcome after each change, shape (m,), if one of the pair is the cause, the other not.
 
     The other did nothing, so it is taken to have been at its reference all along, and changing it changes nothing. The

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from operator import not_
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
-from care_core.causal.kernel import FloatArray
 from care_core.configs.driven import option_value
 from care_core.diagnose.blame import blame
 from care_core.diagnose.fixes import as_likely, change_notes, prediction
@@ -17,6 +16,7 @@ from care_core.diagnose.records import ObjectiveResult, Odds, Prediction
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.ecosystems.ranking import lost_by
 from care_core.errors import UsageError, nearest
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import Record
@@ -124,7 +124,7 @@ class Question(Record, eq=False):
         known = (query.config.get(name), query.reference.get(name))
         return sorted({*option.across(ACROSS), *(value for value in known if value is not None)})
 
-    def _odds(self, configs: Sequence[Config]) -> FloatArray:
+    def _odds(self, configs: Sequence[Config]) -> Floats:
         """Probability that every objective is met: of a run that failed as its report promises it."""
         if self.failure is None:
             return self.query.probability(configs)

@@ -10,15 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Limits
 from care_core.ecosystems.vehicles import Motor
-from care_core.numbers import median
+from care_core.numbers import Bools, Floats, median
 from care_core.records import Record
 from care_core.text import listed, log_time
-
-Floats = NDArray[np.float64]
 
 LIMITS = Limits()
 _BEFORE_S = LIMITS.add("time before the upset", 0.15, "s", "7 of 7 flights with a motor cut: hardest driven in 0.3 s")
@@ -127,7 +124,7 @@ class Weakened(Record):
     others: float
 
 
-def weakened(commands: Commands, flown: NDArray[np.bool_]) -> Weakened | None:
+def weakened(commands: Commands, flown: Bools) -> Weakened | None:
     """The motor that was even with the others and then, alone and to the end, was driven harder.
 
     Args:
@@ -182,7 +179,7 @@ def _share_an_arm(arms_deg: Mapping[int, float], one: int, other: int) -> bool:
     return one in arms_deg and other in arms_deg and abs((arms_deg[one] - arms_deg[other] + 180) % 360 - 180) < _ARM_DEG
 
 
-def _last_rows(t: Floats, upset_s: float) -> NDArray[np.bool_]:
+def _last_rows(t: Floats, upset_s: float) -> Bools:
     """The records just before an upset; of a slow log the nearest one."""
     window = (t >= upset_s - _BEFORE_S) & (t <= upset_s + _EXACT_S)
     if not window.any():

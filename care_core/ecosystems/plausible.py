@@ -10,15 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.dictionary import Dictionary, Message, find_message, instance_field
 from care_core.logs.base import Table
-from care_core.numbers import distinct, median
+from care_core.numbers import Bools, Floats, distinct, median
 from care_core.text import log_time
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 STAMP = "header.stamp"
 """The time at which a ROS robot made a message, by its own clock."""
@@ -211,7 +207,7 @@ def _cleaned(known: Message, table: Table) -> Table:
     return table if keep.all() else table.where(keep)
 
 
-def _nowhere(known: Message, table: Table) -> Mask:
+def _nowhere(known: Message, table: Table) -> Bools:
     """Rows at 0 degrees north and 0 east, of a track that is elsewhere: an estimator without a position says that."""
     if not set(_PLACE) <= set(known.moving) & table.columns.keys():
         return np.zeros(len(table), dtype=bool)
@@ -220,7 +216,7 @@ def _nowhere(known: Message, table: Table) -> Mask:
     return np.asarray((off <= _AT_ZERO_DEG) & (len(known_off) > 0 and float(median(known_off)) > _ELSEWHERE_DEG))
 
 
-def _instances(known: Message, table: Table) -> list[Mask]:
+def _instances(known: Message, table: Table) -> list[Bools]:
     """The rows of each sensor: samples of two batteries alternate without leaping."""
     name = instance_field(known, table.columns)
     if name is None:
@@ -228,7 +224,7 @@ def _instances(known: Message, table: Table) -> list[Mask]:
     return [np.asarray(table[name] == number) for number in distinct(table[name])]
 
 
-def _leaps(column: Floats, step: float) -> Mask:
+def _leaps(column: Floats, step: float) -> Bools:
     """Samples that lie further than `step` from both neighbours, which lie close to each other."""
     leaps = np.zeros(len(column), dtype=bool)
     if len(column) > 2:

@@ -10,14 +10,13 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.coverage import EXTREME, MEAN, Samples
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, extractor, missing, numeric, one_of
 from care_core.ecosystems.registry import ecosystem_of
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median, quantile
+from care_core.numbers import Floats, median, quantile
 from care_core.records import replace
 from care_core.run import Evidence, Unavailable, Value
 
@@ -65,7 +64,7 @@ class Recordings(MissionKind):
         return ()
 
 
-def _numbers(table: Table, field: str) -> NDArray[np.float64] | None:
+def _numbers(table: Table, field: str) -> Floats | None:
     """A column as numbers, shape (n,); None where it is absent or holds none."""
     if field not in table.columns:
         return None
@@ -149,7 +148,7 @@ def signal(mission: Mission, args: Args) -> Value:
     return value * float(args.get("scale", 1.0)) + float(args.get("offset", 0.0))
 
 
-def _statistic(values: NDArray[np.float64], stat: str) -> float:
+def _statistic(values: Floats, stat: str) -> float:
     if stat == "rms":
         return math.sqrt(float(np.mean(values**2)))
     if stat == "change":

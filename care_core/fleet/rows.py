@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery, known_value
-from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
 from care_core.diagnose.noisy_or import NoisyOr, What
 from care_core.diagnose.promise import Promise
@@ -13,6 +12,7 @@ from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Confidence, Diagnosis
 from care_core.diagnose.verdict import RunStatus, verdict_of
 from care_core.ecosystems.findings import FindingKind, Severity
+from care_core.numbers import Floats
 from care_core.records import Record, field, replace
 from care_core.run import FitVerdict, is_known
 from care_core.text import clean
@@ -61,7 +61,7 @@ class Asked(Record):
     failure: NoisyOr | None = None
     """The causes that may have lost it; None where nothing was lost."""
 
-    def odds(self, model: Model, broken: Sequence[str], configs: Sequence[Config]) -> FloatArray:
+    def odds(self, model: Model, broken: Sequence[str], configs: Sequence[Config]) -> Floats:
         """Probability that the next run meets every limit under each configuration, shape (m,), as a report says it."""
         if self.failure is None:
             return self.query(model).probability(configs)

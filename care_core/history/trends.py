@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from care_core.configs.driven import same_value
 from care_core.history.store import Triaged
+from care_core.numbers import Floats
 from care_core.records import Record, replace
 from care_core.run import Robot
 from care_core.variables import asks_alike
@@ -30,8 +31,6 @@ LEAST_RUNS = 5
 """With four runs in perfect order the probability is 2 / 4! = 0.08: fewer can show nothing."""
 _COUNTED, _DRAWN = 7, 9999
 """Up to so many runs all orders are counted (7! = 5040); of more so many are drawn, always the same."""
-
-Floats = NDArray[np.float64]
 
 
 class Changed(Record):

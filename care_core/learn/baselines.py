@@ -9,11 +9,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier, GradientBoostingClassifier
 
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import columns
+from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.variables import Variable
@@ -36,12 +35,12 @@ class Predicate(Record):
     low: float
     high: float
 
-    def holds(self, values: FloatArray) -> NDArray[np.bool_]:
+    def holds(self, values: Floats) -> Bools:
         return (values >= self.low) & (values <= self.high)
 
 
 def cooperative_bug_isolation(
-    frame: pd.DataFrame, failed: NDArray[np.bool_], config: Config, schema: Schema, suspects: Sequence[str]
+    frame: pd.DataFrame, failed: Bools, config: Config, schema: Schema, suspects: Sequence[str]
 ) -> dict[str, float]:
     """Options with the Importance of the predicate that holds in this run (Liblit et al. 2005, section 3), best first.
 
@@ -65,7 +64,7 @@ def _predicate_of(frame: pd.DataFrame, value: float, option: Variable) -> Predic
     return Predicate(float(edges[k]), float(edges[k + 1]))
 
 
-def _importance(predicate: Predicate, values: FloatArray, failed: NDArray[np.bool_]) -> float:
+def _importance(predicate: Predicate, values: Floats, failed: Bools) -> float:
     true = predicate.holds(values)
     seen_failed, seen = int((true & failed).sum()), int(true.sum())
     if not seen_failed or not failed.any():
@@ -83,16 +82,16 @@ class PlainClassifier:
     """Extremely randomised trees averaged with gradient boosting, on options alone: probability of meeting
     everything."""
 
-    def __init__(self, frame: pd.DataFrame, met_all: NDArray[np.bool_], options: Sequence[str], seed: int = 0) -> None:
+    def __init__(self, frame: pd.DataFrame, met_all: Bools, options: Sequence[str], seed: int = 0) -> None:
         self.options = list(options)
         x = frame[self.options].to_numpy(dtype=float)
         self._trees = ExtraTreesClassifier(TREES, min_samples_leaf=2, random_state=seed).fit(x, met_all)
         self._boosting = GradientBoostingClassifier(random_state=seed).fit(x, met_all)
 
-    def probability(self, configs: Sequence[Config]) -> FloatArray:
+    def probability(self, configs: Sequence[Config]) -> Floats:
         """Predicted probability that every objective keeps its threshold, shape (m,)."""
         x = columns([dict(c) for c in configs], self.options)
-        mean: FloatArray = (self._trees.predict_proba(x)[:, 1] + self._boosting.predict_proba(x)[:, 1]) / 2
+        mean: Floats = (self._trees.predict_proba(x)[:, 1] + self._boosting.predict_proba(x)[:, 1]) / 2
         return mean
 
     def rank(self, config: Config, reference: Config, suspects: Sequence[str]) -> list[str]:

@@ -14,7 +14,8 @@ import pandas as pd
 
 from care_core.learn.regression import features
 from care_core.learn.screening import bin_numbers, dependence, discoveries
-from care_core.learn.table import FloatArray, normal_scores
+from care_core.learn.table import normal_scores
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 
 RATE = 0.01
@@ -37,7 +38,7 @@ def chosen_together(frame: pd.DataFrame, schema: Schema, options: Sequence[str])
     return {option: options[int(p[i].argmin())] for i, option in enumerate(options) if found[i].any()}
 
 
-def _flexible(values: FloatArray) -> FloatArray:
+def _flexible(values: Floats) -> Floats:
     """A context as columns that let a choice follow it in any way: scores, magnitude, gaps, and steps."""
     bins = bin_numbers(normal_scores(values))
     return np.column_stack([features(values), *((bins == level).astype(float) for level in np.unique(bins)[1:])])

@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 from scipy.special import erfc, ndtri
 
 from care_core.learn.constraints import Constraints
-from care_core.learn.table import FloatArray, normal_scores
+from care_core.learn.table import normal_scores
+from care_core.numbers import Bools, Floats
 from care_core.records import Record
 
 IntArray = NDArray[np.int64]
@@ -86,7 +87,7 @@ Middles = dict[tuple[int, int, int], Middle]
 class IndependenceTest(Protocol):
     """p-values of independence of x[i] and y[i] given the columns given[i], for all i at once."""
 
-    def p_values(self, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+    def p_values(self, x: IntArray, y: IntArray, given: IntArray) -> Floats:
         """x and y: shape (k,); given: shape (k, d). Returns shape (k,), NaN where the pair cannot be tested."""
 
 
@@ -100,12 +101,12 @@ class FisherZ:
         data: shape (n_runs, n_columns), NaN for missing.
     """
 
-    def __init__(self, data: FloatArray) -> None:
+    def __init__(self, data: Floats) -> None:
         self._scores = normal_scores(data)
         self._missing, self._pattern = _missing_patterns(np.isnan(data))
-        self._by_pattern: dict[int, tuple[FloatArray, NDArray[np.bool_], int]] = {}
+        self._by_pattern: dict[int, tuple[Floats, Bools, int]] = {}
 
-    def p_values(self, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+    def p_values(self, x: IntArray, y: IntArray, given: IntArray) -> Floats:
         patterns = np.bitwise_or.reduce(self._pattern[np.column_stack([x, y, given])], axis=1)
         p = np.empty(len(x))
         for pattern in np.unique(patterns).tolist():
@@ -113,7 +114,7 @@ class FisherZ:
             p[tests] = self._on(pattern, x[tests], y[tests], given[tests])
         return p
 
-    def _on(self, pattern: int, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+    def _on(self, pattern: int, x: IntArray, y: IntArray, given: IntArray) -> Floats:
         if pattern not in self._by_pattern:
             self._by_pattern[pattern] = self._correlations(pattern)
         correlation, varies, n = self._by_pattern[pattern]
@@ -121,7 +122,7 @@ class FisherZ:
         z = np.sqrt(max(n - given.shape[1] - 3, 0)) * np.abs(np.arctanh(r))
         return np.asarray(np.where(varies[x] & varies[y], erfc(z / np.sqrt(2)), np.nan))
 
-    def _correlations(self, pattern: int) -> tuple[FloatArray, NDArray[np.bool_], int]:
+    def _correlations(self, pattern: int) -> tuple[Floats, Bools, int]:
         """Correlations, which columns vary, and the number of runs, over the runs that have these columns."""
         lacking = [rows for bit, rows in enumerate(self._missing) if pattern >> bit & 1]
         known = ~np.any(lacking, axis=0) if lacking else np.ones(len(self._scores), dtype=bool)
@@ -135,7 +136,7 @@ class FisherZ:
         return correlation, varies, len(scores)
 
 
-def _partial_correlation(correlation: FloatArray, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+def _partial_correlation(correlation: Floats, x: IntArray, y: IntArray, given: IntArray) -> Floats:
     """By recursion on the conditioning set, all tests at once."""
     if not given.shape[1]:
         return np.asarray(correlation[x, y])
@@ -146,7 +147,7 @@ def _partial_correlation(correlation: FloatArray, x: IntArray, y: IntArray, give
     return np.asarray((r_xy - r_xl * r_yl) / np.sqrt((1 - r_xl**2) * (1 - r_yl**2)))
 
 
-def _missing_patterns(missing: NDArray[np.bool_]) -> tuple[list[NDArray[np.bool_]], IntArray]:
+def _missing_patterns(missing: Bools) -> tuple[list[Bools], IntArray]:
     """The patterns of missing runs among the columns, and per column the bit of its pattern (0: complete).
 
     Patterns that differ in few runs are merged (their columns lose the runs of both), until there are few patterns.
@@ -156,7 +157,7 @@ def _missing_patterns(missing: NDArray[np.bool_]) -> tuple[list[NDArray[np.bool_
     """
     tolerance = 0.01
     while True:
-        patterns: list[NDArray[np.bool_]] = []
+        patterns: list[Bools] = []
         bits = np.zeros(missing.shape[1], dtype=np.int64)
         for column in np.flatnonzero(missing.any(axis=0)).tolist():
             rows = missing[:, column]
@@ -198,8 +199,8 @@ def discover(
 
 
 def _neighbour_search(
-    possible: NDArray[np.bool_], explains: NDArray[np.bool_], test: IndependenceTest, alpha: float, max_given: int
-) -> tuple[NDArray[np.bool_], SeparatingSets]:
+    possible: Bools, explains: Bools, test: IndependenceTest, alpha: float, max_given: int
+) -> tuple[Bools, SeparatingSets]:
     """The order-independent adjacency search (PC-stable), keeping the set with the largest p-value.
 
     The most independent set, not the first found, decides on colliders: it is the least likely to be a chance find.
@@ -224,9 +225,9 @@ def _neighbour_search(
 
 def _search_beyond(
     marks: IntArray,
-    adjacent: NDArray[np.bool_],
+    adjacent: Bools,
     sets: SeparatingSets,
-    explains: NDArray[np.bool_],
+    explains: Bools,
     test: IndependenceTest,
     alpha: float,
     max_given: int,
@@ -314,14 +315,12 @@ def _choices(count: int, size: int) -> IntArray:
     return np.array(list(combinations(range(count), size)), dtype=np.int64).reshape(comb(count, size), size)
 
 
-def _pairs(adjacent: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def _pairs(adjacent: Bools) -> Iterator[tuple[int, int]]:
     for x, y in zip(*np.nonzero(np.triu(adjacent)), strict=True):
         yield int(x), int(y)
 
 
-def _separate(
-    adjacent: NDArray[np.bool_], sets: SeparatingSets, found: Iterable[tuple[int, int, frozenset[int]]]
-) -> None:
+def _separate(adjacent: Bools, sets: SeparatingSets, found: Iterable[tuple[int, int, frozenset[int]]]) -> None:
     for x, y, given in found:
         adjacent[x, y] = adjacent[y, x] = False
         sets[x, y] = sets[y, x] = given
@@ -331,7 +330,7 @@ def _separate(
 _NONE, _CIRCLE, _ARROW, _TAIL = 0, 1, 2, 3
 
 
-def _known_marks(names: Sequence[str], adjacent: NDArray[np.bool_], constraints: Constraints) -> IntArray:
+def _known_marks(names: Sequence[str], adjacent: Bools, constraints: Constraints) -> IntArray:
     """Circles, except what the constraints say: an arrowhead at what cannot cause, a tail at what is exogenous."""
     marks = adjacent.astype(np.int64) * _CIRCLE
     for i, j in zip(*np.nonzero(adjacent), strict=True):
@@ -342,9 +341,7 @@ def _known_marks(names: Sequence[str], adjacent: NDArray[np.bool_], constraints:
     return marks
 
 
-def _middles(
-    adjacent: NDArray[np.bool_], sets: SeparatingSets, test: IndependenceTest, exogenous: Sequence[bool]
-) -> Middles:
+def _middles(adjacent: Bools, sets: SeparatingSets, test: IndependenceTest, exogenous: Sequence[bool]) -> Middles:
     """What the middle of every unshielded triple is, by how independent its ends are with and without it.
 
     A weak cause and an effect two steps away often look independent given nothing at all; taking the separating set
@@ -391,7 +388,7 @@ def _evidence(triples: Sequence[tuple[int, int, int]], sets: SeparatingSets, tes
     return [0.0 if np.isnan(difference) else float(difference) for difference in after - before]
 
 
-def _p_of(test: IndependenceTest, tests: Sequence[tuple[int, int, Sequence[int]]]) -> FloatArray:
+def _p_of(test: IndependenceTest, tests: Sequence[tuple[int, int, Sequence[int]]]) -> Floats:
     """p-values of single tests with conditioning sets of any size, shape (len(tests),)."""
     p = np.ones(len(tests))
     sizes = np.array([len(given) for _, _, given in tests], dtype=np.int64)
@@ -416,7 +413,7 @@ def _with_colliders(known: IntArray, middles: Middles) -> IntArray:
     return marks
 
 
-def _possibly_separating(marks: IntArray, adjacent: NDArray[np.bool_], start: int) -> set[int]:
+def _possibly_separating(marks: IntArray, adjacent: Bools, start: int) -> set[int]:
     """Nodes reached from `start` by paths whose every inner node is a collider or part of a triangle."""
     steps = [(start, int(node)) for node in np.flatnonzero(adjacent[start])]
     seen = set(steps)
@@ -436,7 +433,7 @@ _ENDPOINTS = {_CIRCLE: Endpoint.CIRCLE, _ARROW: Endpoint.ARROW, _TAIL: Endpoint.
 def _closed_under_rules(
     names: Sequence[str],
     marks: IntArray,
-    adjacent: NDArray[np.bool_],
+    adjacent: Bools,
     sets: SeparatingSets,
     middles: Middles,
     test: IndependenceTest,

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.optimize import minimize
 
-from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.kernel import Kernel
 from care_core.causal.mechanisms import JITTER, Mechanism, Transform, solve, transformed
 from care_core.causal.nominal import Nominal
 from care_core.errors import LearningError
+from care_core.numbers import Bools, Floats
 from care_core.records import Record, replace
 
 
@@ -63,7 +64,7 @@ Rows = NDArray[np.int64] | slice
 class Fold(NamedTuple):
     """Runs that are left out, shape (n,), and which of the others a fit keeps."""
 
-    out: NDArray[np.bool_]
+    out: Bools
     kept: Rows
 
 
@@ -79,21 +80,21 @@ class Inputs(Record):
     others are arguments of the nominal only. Arrays have shape (len(names),)."""
 
     names: tuple[str, ...]
-    log: NDArray[np.bool_]
-    read: NDArray[np.bool_]
+    log: Bools
+    read: Bools
     nominal: Nominal | None = None
     """What physics says of a positive target; its arguments are among the names."""
     least: float = 0.0
     """No relevance ends below it; where it is above 0 no input is left out, however little it moves."""
 
     @classmethod
-    def all_read(cls, names: Sequence[str], log: NDArray[np.bool_]) -> Inputs:
+    def all_read(cls, names: Sequence[str], log: Bools) -> Inputs:
         return cls(tuple(names), log, np.ones(len(names), dtype=bool))
 
 
 def fit_mechanism(
-    x: FloatArray,
-    y: FloatArray,
+    x: Floats,
+    y: Floats,
     inputs: Inputs,
     *,
     binary: bool,
@@ -107,8 +108,8 @@ def fit_mechanism(
 
 
 def fit(
-    x: FloatArray,
-    y: FloatArray,
+    x: Floats,
+    y: Floats,
     inputs: Inputs,
     *,
     binary: bool,
@@ -195,8 +196,8 @@ def drawn_folds(groups: NDArray[np.int64], effort: Effort, rng: np.random.Genera
 
 
 def _without_each(
-    folds: Sequence[Fold], x: FloatArray, y: FloatArray, groups: NDArray[np.int64], refit: Callable[..., Fitted]
-) -> Iterator[tuple[NDArray[np.bool_], Mechanism]]:
+    folds: Sequence[Fold], x: Floats, y: Floats, groups: NDArray[np.int64], refit: Callable[..., Fitted]
+) -> Iterator[tuple[Bools, Mechanism]]:
     """The runs of each fold in turn, and the mechanism of those of the others that a fit keeps."""
     for out, kept in folds:
         yield out, refit(x[~out][kept], y[~out][kept], groups=groups[~out][kept]).mechanism
@@ -204,8 +205,8 @@ def _without_each(
 
 def tested_on_runs_left_out(
     mechanism: Mechanism,
-    x: FloatArray,
-    y: FloatArray,
+    x: Floats,
+    y: Floats,
     inputs: Inputs,
     *,
     effort: Effort,
@@ -244,12 +245,12 @@ class Held(Record, eq=False):
     """What mechanisms that did not know a run said of it, on the transformed scale; and how badly: its negative log
     likelihood, that of one `FARTHEST` standard deviations off at most. Both of shape (n,)."""
 
-    latent: FloatArray
-    loss: FloatArray
+    latent: Floats
+    loss: Floats
 
 
 def held_out(
-    x: FloatArray, y: FloatArray, inputs: Inputs, *, binary: bool, effort: Effort, groups: NDArray[np.int64],
+    x: Floats, y: Floats, inputs: Inputs, *, binary: bool, effort: Effort, groups: NDArray[np.int64],
     folds: Sequence[Fold],
 ) -> Held:  # fmt: skip
     """Fit without each fold in turn, and ask about the runs in it. Half of the steps are as good here: what is compared
@@ -274,7 +275,7 @@ def held_out(
     return Held(latent, loss)
 
 
-def _loss(mechanism: Mechanism, errors: FloatArray, error_sd: FloatArray) -> float:
+def _loss(mechanism: Mechanism, errors: Floats, error_sd: Floats) -> float:
     """Mean negative log likelihood of the runs, each given those of other missions."""
     if not mechanism.binary:
         error_sd = mechanism.scale * error_sd
@@ -285,7 +286,7 @@ def _loss(mechanism: Mechanism, errors: FloatArray, error_sd: FloatArray) -> flo
     return float(np.logaddexp(0, np.where(coded > 0, -logit, logit)).mean())
 
 
-def best_transform(y: FloatArray) -> Transform:
+def best_transform(y: Floats) -> Transform:
     """The scale on which the target is least skewed: times and energies act as ratios, counts have heavy tails."""
     choices: list[Transform] = ["identity"]
     if (y > 0).all():
@@ -295,13 +296,13 @@ def best_transform(y: FloatArray) -> Transform:
     return min(choices, key=lambda choice: abs(_skewness(transformed(y, choice))))
 
 
-def _skewness(values: FloatArray) -> float:
+def _skewness(values: Floats) -> float:
     sd = values.std()
     return 0.0 if sd == 0 else float((((values - values.mean()) / sd) ** 3).mean())
 
 
 def _fit_kernel(
-    points: FloatArray, targets: FloatArray, iterations: int, least_noise: float, least: float, start: Kernel | None
+    points: Floats, targets: Floats, iterations: int, least_noise: float, least: float, start: Kernel | None
 ) -> Kernel:
     p = points.shape[1]
     if p == 0 or np.ptp(targets) == 0:
@@ -322,11 +323,11 @@ def _fit_kernel(
     return Kernel(theta[:p], float(theta[p]), float(theta[p + 1]), float(theta[p + 2]))
 
 
-def slopes(kernel: Kernel) -> FloatArray:
+def slopes(kernel: Kernel) -> Floats:
     """What one standard deviation of each input moves the target by, as the kernel expects it before any run, shape
     (p,). A relevance alone does not say: with a large amplitude a small one is a straight line."""
     p = max(1, len(kernel.relevance))
-    slopes: FloatArray = np.hypot(kernel.additive / np.sqrt(p), kernel.joint) * kernel.relevance
+    slopes: Floats = np.hypot(kernel.additive / np.sqrt(p), kernel.joint) * kernel.relevance
     return slopes
 
 
@@ -336,7 +337,7 @@ def _below(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.tril_indices(n, -1)
 
 
-def _pairs(points: FloatArray) -> FloatArray:
+def _pairs(points: Floats) -> Floats:
     """Squared distance of every pair of points by input, shape (p, n (n - 1) / 2): what is left of a symmetric matrix,
     in the order of its rows below the diagonal."""
     rows, others = _below(len(points))
@@ -353,7 +354,7 @@ class _Posterior:
     than all sums.
     """
 
-    def __init__(self, points: FloatArray, targets: FloatArray) -> None:
+    def __init__(self, points: Floats, targets: Floats) -> None:
         self._targets = targets
         self._squared = squared = _pairs(points)
         n, pairs = len(targets), squared.shape[1]
@@ -365,7 +366,7 @@ class _Posterior:
         self._leaning = np.empty_like(squared)
         self._part = np.empty((len(squared), max(1, CACHED // len(squared))))
 
-    def __call__(self, log_theta: FloatArray) -> tuple[float, FloatArray]:
+    def __call__(self, log_theta: Floats) -> tuple[float, Floats]:
         """Value and gradient with respect to the logarithms of (relevances, additive, joint, noise)."""
         targets, p = self._targets, len(self._squared)
         relevance, (additive, joint, noise) = np.exp(log_theta[:p]), np.exp(log_theta[p:])
@@ -388,7 +389,7 @@ class _Posterior:
         ]
         return float(value + np.log1p(ratio).sum()), gradient
 
-    def _measure(self, relevance: FloatArray) -> None:
+    def _measure(self, relevance: Floats) -> None:
         """The joint part of the kernel of every pair, the mean over the inputs of its parts, and each part times its
         squared distance. So many pairs at a time stay in the processor's cache."""
         rate = -0.5 * (relevance**2)[:, None]
@@ -403,7 +404,7 @@ class _Posterior:
         self._mean /= p
         np.exp(self._together, out=self._together)
 
-    def _covariance(self, additive: float, joint: float, noise: float) -> FloatArray:
+    def _covariance(self, additive: float, joint: float, noise: float) -> Floats:
         """Of the runs, below the diagonal; a point and itself are at no distance."""
         n = len(self._targets)
         np.multiply(self._mean, additive**2, out=self._one)
@@ -413,8 +414,8 @@ class _Posterior:
         return self._matrix.reshape(n, n, order="F")
 
     def _sensitivities(
-        self, inverse: FloatArray, alpha: FloatArray, acting: float, with_others: float
-    ) -> tuple[FloatArray, FloatArray]:
+        self, inverse: Floats, alpha: Floats, acting: float, with_others: float
+    ) -> tuple[Floats, Floats]:
         """How the value answers to the two parts of each pair's kernel. Each pair stands for two places of the
         symmetric matrix."""
         one, other = self._one, self._other
@@ -430,8 +431,8 @@ class _Posterior:
 
 
 def left_out(
-    kernel: Kernel, points: FloatArray, targets: FloatArray, groups: NDArray[np.int64] | None = None
-) -> tuple[FloatArray, FloatArray]:
+    kernel: Kernel, points: Floats, targets: Floats, groups: NDArray[np.int64] | None = None
+) -> tuple[Floats, Floats]:
     """Errors of each run, predicted without its group, and their predicted standard deviations; shape (n,) each.
 
     Rasmussen and Williams 2006, Eq. 5.12, with blocks of the inverse in place of its diagonal.
@@ -450,17 +451,17 @@ def left_out(
     return errors, error_sd
 
 
-def residual_levels(standardised: FloatArray) -> FloatArray:
-    levels: FloatArray = np.quantile(standardised, (np.arange(RESIDUAL_LEVELS) + 0.5) / RESIDUAL_LEVELS)
+def residual_levels(standardised: Floats) -> Floats:
+    levels: Floats = np.quantile(standardised, (np.arange(RESIDUAL_LEVELS) + 0.5) / RESIDUAL_LEVELS)
     return levels
 
 
-def logistic(score: FloatArray, y: FloatArray) -> FloatArray:
+def logistic(score: Floats, y: Floats) -> Floats:
     """Platt's calibration of leave-one-out scores: (slope, offset), slope never negative, targets smoothed."""
     positive, negative = y.sum(), len(y) - y.sum()
     smoothed = np.where(y > 0.5, (positive + 1) / (positive + 2), 1 / (negative + 2))
 
-    def loss(theta: FloatArray) -> tuple[float, FloatArray]:
+    def loss(theta: Floats) -> tuple[float, Floats]:
         logit = theta[0] * score + theta[1]
         probability = 1 / (1 + np.exp(-logit))
         value = np.logaddexp(0, logit).sum() - (smoothed * logit).sum()
@@ -468,5 +469,5 @@ def logistic(score: FloatArray, y: FloatArray) -> FloatArray:
         return float(value), np.array([(difference * score).sum(), difference.sum()])
 
     best = minimize(loss, np.array([1.0, 0.0]), jac=True, method="L-BFGS-B", bounds=[(0, 20), (-10, 10)])
-    calibration: FloatArray = best.x
+    calibration: Floats = best.x
     return calibration

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from care_core.causal.abduction import FARTHEST
 from care_core.causal.graph import CausalGraph
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import LEAST, Mechanism, transformed
 from care_core.causal.model import Mediation, OutcomeRecord
 from care_core.learn.fitting import left_out
 from care_core.learn.relative import left_out_together
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.variables import Role
@@ -83,7 +83,7 @@ def with_mediation(
     }
 
 
-def _errors(name: str, mechanisms: Mapping[str, Mechanism], frame: pd.DataFrame, schema: Schema) -> FloatArray:
+def _errors(name: str, mechanisms: Mapping[str, Mechanism], frame: pd.DataFrame, schema: Schema) -> Floats:
     """Errors of the runs in standard deviations, each by a mechanism that does not know it; NaN where a run has no
     value; shape (n,)."""
     mechanism, values = mechanisms[name], frame[name].to_numpy(dtype=float)
@@ -99,7 +99,7 @@ def _errors(name: str, mechanisms: Mapping[str, Mechanism], frame: pd.DataFrame,
     return standard
 
 
-def _gain(theirs: FloatArray, own: FloatArray, parts: NDArray[np.int64]) -> FloatArray:
+def _gain(theirs: Floats, own: Floats, parts: NDArray[np.int64]) -> Floats:
     """Log likelihood of each run's error by what the metrics of runs of other parts say, over that without them."""
     numbers, place = np.unique(parts, return_inverse=True)
     fold = (np.random.default_rng(0).permutation(len(numbers)) % FOLDS)[place]
@@ -113,7 +113,7 @@ def _gain(theirs: FloatArray, own: FloatArray, parts: NDArray[np.int64]) -> Floa
     return gain
 
 
-def _weights(theirs: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _weights(theirs: Floats, own: Floats) -> tuple[Floats, Floats]:
     """Share of each metric's error (n, q) in the objective's (n,), and the correlations of the metrics' errors."""
     count = theirs.shape[1]
     among = np.array([_correlation(theirs, column) for column in theirs.T]) / (1 + RIDGE)
@@ -123,7 +123,7 @@ def _weights(theirs: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArra
     return weights * np.sqrt(EXPLAINED / max(explained, EXPLAINED)), among
 
 
-def _correlation(columns: FloatArray, values: FloatArray) -> FloatArray:
+def _correlation(columns: Floats, values: Floats) -> Floats:
     """Of each column with the values, 0 where one of them never varies; shape (q,)."""
     covariance = (columns - columns.mean(axis=0)).T @ (values - values.mean()) / len(values)
     spread = columns.std(axis=0) * values.std()

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.graph import CausalGraph
@@ -16,6 +15,7 @@ from care_core.learn.baselines import cooperative_bug_isolation
 from care_core.learn.fault_files import FAULTY_RUNS, FaultFile
 from care_core.learn.outcomes import met
 from care_core.learn.transfer import carry_over
+from care_core.numbers import Bools
 from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.variables import Threshold
@@ -143,9 +143,7 @@ def usual_values(schema: Schema, fault: FaultFile, config: Config) -> dict[str, 
 
 def by_bug_isolation(schema: Schema, fault: FaultFile) -> list[str]:
     """Options whose predicate, true in a faulty run, has importance above zero in the runs of the file, best first."""
-    failed: NDArray[np.bool_] = (
-        np.nan_to_num(met(schema.variables[fault.objective], fault.runs, schema), nan=0.0) == 0.0
-    )
+    failed: Bools = np.nan_to_num(met(schema.variables[fault.objective], fault.runs, schema), nan=0.0) == 0.0
     failed[:FAULTY_RUNS] = True
     options = [option.name for option in schema.options]
     best: dict[str, float] = {}

@@ -14,7 +14,7 @@ from scipy.special import xlogy
 from care_core.causal.graph import Edge
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import Mark, Pag, PagEdge
-from care_core.learn.table import FloatArray
+from care_core.numbers import Floats
 from care_core.records import Record
 from care_core.variables import Role
 
@@ -35,9 +35,7 @@ class Resolved(Record):
     notes: tuple[str, ...]
 
 
-def resolve(
-    pag: Pag, columns: Mapping[str, FloatArray], constraints: Constraints, rng: np.random.Generator
-) -> Resolved:
+def resolve(pag: Pag, columns: Mapping[str, Floats], constraints: Constraints, rng: np.random.Generator) -> Resolved:
     """Turn every edge of the partial graph into a directed or a bidirected one.
 
     `a o-> b` and `a o-o b`: bidirected if a low-entropy latent explains the pair. Otherwise `a --> b`, or for
@@ -80,9 +78,7 @@ class _Reading(Record):
     strength: float
 
 
-def _read(
-    edge: PagEdge, columns: Mapping[str, FloatArray], constraints: Constraints, rng: np.random.Generator
-) -> _Reading:
+def _read(edge: PagEdge, columns: Mapping[str, Floats], constraints: Constraints, rng: np.random.Generator) -> _Reading:
     pair = (min(edge.a, edge.b), max(edge.a, edge.b))
     ways = [
         (cause, effect)
@@ -111,7 +107,7 @@ def _cycle_note(first: Edge, open_ways: Sequence[Edge]) -> str:
     return f"{first[0]} -> {first[1]} would close a cycle; {taken} was taken."
 
 
-def joint_distribution(x: FloatArray, y: FloatArray) -> FloatArray:
+def joint_distribution(x: Floats, y: Floats) -> Floats:
     """Joint frequencies of two columns over the rows that both have, in up to `BINS` equally filled bins each.
 
     A column with at most `BINS` different values keeps them.
@@ -123,7 +119,7 @@ def joint_distribution(x: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(counts / max(both.sum(), 1))
 
 
-def _levels(values: FloatArray) -> NDArray[np.int64]:
+def _levels(values: Floats) -> NDArray[np.int64]:
     levels = np.unique(values)
     if len(levels) > BINS:
         levels = np.unique(np.quantile(values, np.arange(1, BINS) / BINS))
@@ -131,17 +127,17 @@ def _levels(values: FloatArray) -> NDArray[np.int64]:
     return np.asarray(np.unique(values, return_inverse=True)[1], dtype=np.int64)
 
 
-def entropy(p: FloatArray) -> float:
+def entropy(p: Floats) -> float:
     """Shannon entropy in nats of a distribution of any shape."""
     return float(-xlogy(p, p).sum())
 
 
-def mutual_information(joint: FloatArray) -> float:
+def mutual_information(joint: Floats) -> float:
     """I(X;Y) in nats of a joint distribution of shape (k, l)."""
     return entropy(joint.sum(axis=1)) + entropy(joint.sum(axis=0)) - entropy(joint)
 
 
-def has_latent_cause(joint: FloatArray, rng: np.random.Generator) -> bool:
+def has_latent_cause(joint: Floats, rng: np.random.Generator) -> bool:
     """Whether a latent Z with H(Z) < 0.8 min(H(X), H(Y)) makes X and Y independent.
 
     Args:
@@ -152,7 +148,7 @@ def has_latent_cause(joint: FloatArray, rng: np.random.Generator) -> bool:
     return mutual_information(joint) < bound and latent_entropy(joint, rng) < bound
 
 
-def latent_entropy(joint: FloatArray, rng: np.random.Generator, *, leftover: float = 0.001) -> float:
+def latent_entropy(joint: Floats, rng: np.random.Generator, *, leftover: float = 0.001) -> float:
     """Smallest entropy found of a Z that leaves at most `leftover` nats of I(X;Y|Z); infinite if none was found.
 
     LatentSearch (Kocaoglu et al. 2020, Alg. 1): the update q(z|x,y) ~ q(z|x) q(z|y) / q(z)^(1-beta) does not
@@ -181,12 +177,12 @@ def latent_entropy(joint: FloatArray, rng: np.random.Generator, *, leftover: flo
     return float(h_z[left <= leftover].min(initial=np.inf))
 
 
-def points_forward(joint: FloatArray) -> bool:
+def points_forward(joint: Floats) -> bool:
     """Whether X -> Y needs less exogenous entropy than Y -> X (Alg. 1, lines 11 to 14)."""
     return exogenous_entropy(joint) < exogenous_entropy(joint.T)
 
 
-def exogenous_entropy(joint: FloatArray) -> float:
+def exogenous_entropy(joint: Floats) -> float:
     """Entropy of the smallest noise E, found greedily, with Y = f(X, E) and E independent of X.
 
     Such an E couples the conditionals p(Y|x) of all x (Kocaoglu et al. 2017, greedy minimum-entropy coupling).

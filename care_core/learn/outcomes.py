@@ -15,7 +15,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import Averaging, Mechanism, transformed
 from care_core.causal.model import OutcomeRecord, StageRecord
 from care_core.causal.nominal import Nominal
@@ -38,6 +37,7 @@ from care_core.learn.fitting import (
 from care_core.learn.knowledge import with_known
 from care_core.learn.relative import left_out_together, needs
 from care_core.learn.table import varying
+from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.variables import Events, Role, Variable
@@ -57,8 +57,8 @@ class Stage(Record):
 
     variable: str
     passes: float
-    reached: NDArray[np.bool_]
-    passed: NDArray[np.bool_]
+    reached: Bools
+    passed: Bools
 
 
 def causes_of(name: str, graph: CausalGraph, schema: Schema, *, contexts: bool = False) -> tuple[str, ...]:
@@ -111,7 +111,7 @@ def inputs_of(names: Sequence[str], schema: Schema, nominal: Nominal | None = No
     )
 
 
-def met(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
+def met(objective: Variable, frame: pd.DataFrame, schema: Schema) -> Floats:
     """1 where the objective keeps its threshold, 0 where not, NaN where it has no value; shape (n,)."""
     values = frame[objective.name].to_numpy(dtype=float)
     if objective.fixed is None and objective.relative is not None:
@@ -123,7 +123,7 @@ def met(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
     return np.array(kept)
 
 
-def badness(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
+def badness(objective: Variable, frame: pd.DataFrame, schema: Schema) -> Floats:
     """How bad each run was: the value, turned so that more is worse, its logarithm where it has one; shape (n,)."""
     if objective.kind == "functional":
         return 1.0 - met(objective, frame, schema)
@@ -154,7 +154,7 @@ def find_stages(objective: Variable, schema: Schema, frame: pd.DataFrame) -> tup
     return tuple(stages)
 
 
-def _stage(metric: Variable, frame: pd.DataFrame, success: FloatArray, reached: NDArray[np.bool_]) -> Stage | None:
+def _stage(metric: Variable, frame: pd.DataFrame, success: Floats, reached: Bools) -> Stage | None:
     if metric.type != "bool":
         return None
     values = frame[metric.name].to_numpy(dtype=float)
@@ -282,7 +282,7 @@ class _Set(Record, eq=False):
     and what is added to its loss."""
 
     inputs: Inputs
-    x: FloatArray
+    x: Floats
     kept: Rows
     penalty: float
     is_whole: bool
@@ -296,7 +296,7 @@ class Question(Record, eq=False):
     """
 
     target: str
-    y: FloatArray
+    y: Floats
     groups: NDArray[np.int64]
     sets: tuple[_Set, ...]
     folds: tuple[Fold, ...]
@@ -402,7 +402,7 @@ def ask(
     return Question(target, y, groups, tuple(compared), folds, effort, parts)
 
 
-def chosen(losses: Sequence[FloatArray], is_whole: Sequence[bool]) -> int:
+def chosen(losses: Sequence[Floats], is_whole: Sequence[bool]) -> int:
     """Place of the input set to take: the one with the least mean loss of the runs, shape (n,) each, or one of all
     options where that is no worse by more than a standard error. An option that is left out is never named."""
     order = np.argsort(np.nan_to_num([loss.mean() for loss in losses], nan=np.inf), kind="stable").tolist()
@@ -414,7 +414,7 @@ def chosen(losses: Sequence[FloatArray], is_whole: Sequence[bool]) -> int:
     return best
 
 
-def _is_binary(y: FloatArray) -> bool:
+def _is_binary(y: Floats) -> bool:
     return set(np.unique(y)) <= {0.0, 1.0}
 
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from care_core.learn.table import FloatArray, normal_scores
+from care_core.learn.table import normal_scores
+from care_core.numbers import Bools, Floats
 from care_core.records import Record
 
 ROWS_PER_COLUMN = 3
@@ -28,11 +28,11 @@ class Regressions:
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame = frame
-        self._columns: dict[str, FloatArray] = {}
-        self._features: dict[tuple[str, bytes], FloatArray] = {}
+        self._columns: dict[str, Floats] = {}
+        self._features: dict[tuple[str, bytes], Floats] = {}
         self._fits: dict[tuple[tuple[str, ...], bytes], _Design] = {}
 
-    def p_of_each(self, names: Sequence[str], target: str) -> FloatArray:
+    def p_of_each(self, names: Sequence[str], target: str) -> Floats:
         """p-value of each variable adding nothing to a least-squares fit of the target on all the others.
 
         Of more variables than the runs can carry, the ones most correlated with the target are held, and the rest
@@ -48,9 +48,7 @@ class Regressions:
         runs = ~np.isnan(self._column(target)) & ~np.isnan(self._column(name))
         return float(self._p_of_each([name, *given], target, runs, [name])[0])
 
-    def _p_of_each(
-        self, names: Sequence[str], target: str, runs: NDArray[np.bool_], asked: Sequence[str]
-    ) -> FloatArray:
+    def _p_of_each(self, names: Sequence[str], target: str, runs: Bools, asked: Sequence[str]) -> Floats:
         p = np.ones(len(asked))
         y = normal_scores(self._column(target)[runs])
         if len(y) < 2 * ROWS_PER_COLUMN or np.ptp(y) == 0:
@@ -69,18 +67,18 @@ class Regressions:
                 p[i] = _f_test(left, beyond, design.rank)
         return p
 
-    def _column(self, name: str) -> FloatArray:
+    def _column(self, name: str) -> Floats:
         if name not in self._columns:
             self._columns[name] = self._frame[name].to_numpy(dtype=float)
         return self._columns[name]
 
-    def _block(self, name: str, runs: NDArray[np.bool_]) -> FloatArray:
+    def _block(self, name: str, runs: Bools) -> Floats:
         key = name, np.packbits(runs).tobytes()
         if key not in self._features:
             self._features[key] = features(self._column(name)[runs])
         return self._features[key]
 
-    def _design(self, held: tuple[str, ...], runs: NDArray[np.bool_]) -> _Design:
+    def _design(self, held: tuple[str, ...], runs: Bools) -> _Design:
         key = held, np.packbits(runs).tobytes()
         if key not in self._fits:
             self._fits[key] = _Design.of({name: self._block(name, runs) for name in held}, int(runs.sum()))
@@ -94,14 +92,14 @@ class _Design(Record, eq=False):
     own is tested.
     """
 
-    x: FloatArray
-    inverse: FloatArray
+    x: Floats
+    inverse: Floats
     rank: int
-    own: dict[str, tuple[slice, FloatArray, FloatArray]]
+    own: dict[str, tuple[slice, Floats, Floats]]
     """Per block: its columns, the directions that no other block repeats, and the inverse of their covariance."""
 
     @classmethod
-    def of(cls, blocks: dict[str, FloatArray], n: int) -> _Design:
+    def of(cls, blocks: dict[str, Floats], n: int) -> _Design:
         x = np.column_stack([np.ones((n, 1)), *blocks.values()])
         inverse = np.linalg.pinv(x.T @ x, rcond=1e-10, hermitian=True)
         # Projects on the combinations of columns that cancel.
@@ -115,7 +113,7 @@ class _Design(Record, eq=False):
             own[name] = part, kept, np.linalg.inv(kept.T @ inverse[part, part] @ kept)
         return cls(x, inverse, x.shape[1] - round(float(np.trace(repeated))), own)
 
-    def p_of(self, name: str, b: FloatArray, noise: float, freedom: int) -> float:
+    def p_of(self, name: str, b: Floats, noise: float, freedom: int) -> float:
         part, own, precision = self.own[name]
         if not own.size:
             return 1.0
@@ -123,7 +121,7 @@ class _Design(Record, eq=False):
         return float(fdtrc(own.shape[1], freedom, float(effect @ precision @ effect) / own.shape[1] / noise))
 
 
-def _held(blocks: dict[str, FloatArray], y: FloatArray) -> tuple[str, ...]:
+def _held(blocks: dict[str, Floats], y: Floats) -> tuple[str, ...]:
     """The blocks that are fitted together: the most correlated ones, as many columns as the runs can carry."""
     order = sorted(blocks, key=lambda name: -float(np.abs(blocks[name].T @ y).max(initial=0.0)))
     held, used = set(), 1
@@ -135,7 +133,7 @@ def _held(blocks: dict[str, FloatArray], y: FloatArray) -> tuple[str, ...]:
     return tuple(name for name in blocks if name in held)
 
 
-def features(values: FloatArray) -> FloatArray:
+def features(values: Floats) -> Floats:
     """Scores and their magnitude, and where the value is missing, as orthonormal columns; shape (n, 0 to 3).
 
     A yes-or-no variable has one column, since its magnitude repeats its score: a test counts what is really added.
@@ -148,13 +146,13 @@ def features(values: FloatArray) -> FloatArray:
     return _span(columns - columns.mean(axis=0)) if columns.size else columns
 
 
-def _span(columns: FloatArray) -> FloatArray:
+def _span(columns: Floats) -> Floats:
     """Orthonormal columns with the same span."""
     left, values, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(left[:, values > 1e-8 * values.max()])
 
 
-def _f_test(target: FloatArray, added: FloatArray, used: int) -> float:
+def _f_test(target: Floats, added: Floats, used: int) -> float:
     """F-test of added columns; both sides already without what `used` columns explain."""
     if not added.size or float(np.abs(added).max()) < 1e-9:
         return 1.0

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from care_core.causal.kernel import FloatArray
+from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.variables import Role, Variable
@@ -31,7 +31,7 @@ def relative(frame: pd.DataFrame, schema: Schema) -> pd.DataFrame:
     return compared
 
 
-def needs(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
+def needs(objective: Variable, frame: pd.DataFrame, schema: Schema) -> Floats:
     """What the reference configuration needs for the mission of each run, shape (n,).
 
     It is what runs of the same mission with every option at its reference took; where there is none, the nominal
@@ -97,7 +97,7 @@ def _count(parts: NDArray[np.int64]) -> float:
     return float(sizes.sum() ** 2 / (sizes**2).sum()) if len(sizes) else 0.0
 
 
-def is_reference(frame: pd.DataFrame, schema: Schema) -> NDArray[np.bool_]:
+def is_reference(frame: pd.DataFrame, schema: Schema) -> Bools:
     """Which runs were made with every option at its reference; shape (n,)."""
     at = np.ones(len(frame), dtype=bool)
     for option in schema.options:
@@ -111,7 +111,7 @@ def of_ratios(schema: Schema) -> Schema:
     return replace(schema, variables={name: replace(v, nominal=None) for name, v in schema.variables.items()})
 
 
-def _at_reference(frame: pd.DataFrame, schema: Schema, name: str) -> FloatArray:
+def _at_reference(frame: pd.DataFrame, schema: Schema, name: str) -> Floats:
     """An option's reference in every run, or the context that the run met; shape (n,)."""
     variable, values = schema.variables[name], frame[name].to_numpy(dtype=float)
     if variable.role is Role.OPTION:

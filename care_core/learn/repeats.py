@@ -14,12 +14,12 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import JITTER, LEAST, Mechanism, transformed
 from care_core.causal.model import UNKNOWN_CARRY_OVER, NoiseCarryOver, OutcomeRecord, ReferenceRuns
 from care_core.learn.outcomes import find_stages
 from care_core.learn.relative import configurations_of, is_reference
 from care_core.learn.skill import all_met
+from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 from care_core.tables.rows import CONDITIONS
 
@@ -70,7 +70,7 @@ def repeated(frame: pd.DataFrame, schema: Schema) -> tuple[Pairs, Pairs]:
     return pairs
 
 
-def _targets(key: str, objective: str, frame: pd.DataFrame, schema: Schema) -> FloatArray:
+def _targets(key: str, objective: str, frame: pd.DataFrame, schema: Schema) -> Floats:
     """What a mechanism was fitted on, NaN where a run says nothing of it; shape (n,)."""
     if not key.startswith("stage:"):
         return frame[key].to_numpy(dtype=float)
@@ -83,7 +83,7 @@ def _targets(key: str, objective: str, frame: pd.DataFrame, schema: Schema) -> F
 
 
 def _share(
-    pairs: Pairs, fitted: Sequence[tuple[Mechanism, FloatArray]], frame: pd.DataFrame, unknown: float
+    pairs: Pairs, fitted: Sequence[tuple[Mechanism, Floats]], frame: pd.DataFrame, unknown: float
 ) -> tuple[float, int]:
     """The share and the number of pairs behind it; `unknown` without any."""
     likelihood, count = np.zeros(len(SHARES)), 0
@@ -100,9 +100,7 @@ def _share(
     return float((SHARES * weight).sum() / weight.sum()), count
 
 
-def _log_likelihood(
-    mechanism: Mechanism, values: FloatArray, known: np.typing.NDArray[np.bool_], pairs: Pairs, frame: pd.DataFrame
-) -> FloatArray:
+def _log_likelihood(mechanism: Mechanism, values: Floats, known: Bools, pairs: Pairs, frame: pd.DataFrame) -> Floats:
     """Of every share, shape (len(SHARES),)."""
     paired = {row for pair in pairs for row in pair}
     rest = [int(row) for row in np.flatnonzero(known) if row not in paired]

@@ -15,7 +15,8 @@ import pandas as pd
 
 from care_core.learn.fitting import MIN_ROWS
 from care_core.learn.outcomes import badness
-from care_core.learn.table import FloatArray, normal_scores, varying
+from care_core.learn.table import normal_scores, varying
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record
 
@@ -45,12 +46,12 @@ def robustness(frame: pd.DataFrame, schema: Schema, objective: str) -> Mapping[s
     }
 
 
-def _partial(x: FloatArray, y: FloatArray) -> FloatArray:
+def _partial(x: Floats, y: Floats) -> Floats:
     """Squared partial correlation of each column with y given all the others, shape (p,)."""
     joint = np.column_stack([x, y])
     precision = np.linalg.pinv(np.cov(joint, rowvar=False))
     scale = np.maximum(np.diag(precision), 1e-12)
-    share: FloatArray = np.clip(precision[:-1, -1] ** 2 / (scale[:-1] * scale[-1]), 0.0, 1 - 1e-9)
+    share: Floats = np.clip(precision[:-1, -1] ** 2 / (scale[:-1] * scale[-1]), 0.0, 1 - 1e-9)
     return share
 
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, ndtri, stdtr
 from scipy.stats import false_discovery_control
 
-from care_core.learn.table import FloatArray, normal_scores
+from care_core.learn.table import normal_scores
+from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record
 
@@ -49,7 +50,7 @@ def screen_options(frame: pd.DataFrame, schema: Schema, *, false_discovery_rate:
     )
 
 
-def dependence(sources: FloatArray, targets: FloatArray) -> FloatArray:
+def dependence(sources: Floats, targets: Floats) -> Floats:
     """p-values of marginal independence of every source with every target.
 
     Two tests on normal scores: correlation (sensitive to monotonic effects) and one-way analysis of variance over
@@ -73,14 +74,14 @@ def dependence(sources: FloatArray, targets: FloatArray) -> FloatArray:
     return np.asarray(np.where(uncommon, 1.0, np.minimum(either, 1.0)))
 
 
-def discoveries(p: FloatArray, rate: float) -> NDArray[np.bool_]:
+def discoveries(p: Floats, rate: float) -> Bools:
     """Benjamini-Hochberg: which of the p-values are discoveries at this false discovery rate. Any shape."""
     if not p.size:
         return np.zeros(p.shape, dtype=bool)
     return np.asarray(false_discovery_control(p, axis=None) <= rate).reshape(p.shape)
 
 
-def pairwise_correlation(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def pairwise_correlation(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Pearson correlation over the rows that both columns have.
 
     Args:
@@ -105,27 +106,27 @@ def pairwise_correlation(x: FloatArray, y: FloatArray) -> tuple[FloatArray, Floa
     return np.asarray(r), np.asarray(np.where(varies, n, 0.0))
 
 
-def _correlation_p(x: FloatArray, y: FloatArray) -> FloatArray:
+def _correlation_p(x: Floats, y: Floats) -> Floats:
     r, n = pairwise_correlation(x, y)
     freedom = np.maximum(n - 2, 1)
     t = np.abs(r) * np.sqrt(freedom / np.maximum(1 - r**2, 1e-12))
     return np.asarray(np.where(n > 2, 2 * stdtr(freedom, -t), 1.0))
 
 
-def _off_mode(y: FloatArray) -> FloatArray:
+def _off_mode(y: Floats) -> Floats:
     """How many rows of each column are off its most frequent value, shape (m,)."""
     known = [column[np.isfinite(column)] for column in y.T]
     return np.array([len(v) - max(np.unique(v, return_counts=True)[1], default=0) for v in known], dtype=float)
 
 
-def _rarest_count(bins: NDArray[np.int64], y: FloatArray) -> FloatArray:
+def _rarest_count(bins: NDArray[np.int64], y: Floats) -> Floats:
     """Rows off the usual value of a target that the emptiest bin of a source expects, shape (k, m)."""
     filled = [np.bincount(column[column >= 0], minlength=BINS) for column in bins.T]
     smallest = np.array([min(count[count > 0], default=0) / max(count.sum(), 1) for count in filled])
     return np.asarray(np.outer(smallest, _off_mode(y)))
 
 
-def _binned_p(bins: NDArray[np.int64], y: FloatArray) -> FloatArray:
+def _binned_p(bins: NDArray[np.int64], y: Floats) -> Floats:
     """F-tests of the targets' means over the sources' bins, all pairs at once."""
     has_y = np.isfinite(y).astype(float)
     y = np.nan_to_num(y)
@@ -149,6 +150,6 @@ def _binned_p(bins: NDArray[np.int64], y: FloatArray) -> FloatArray:
     return np.asarray(np.where(usable, p, 1.0))
 
 
-def bin_numbers(x: FloatArray) -> NDArray[np.int64]:
+def bin_numbers(x: Floats) -> NDArray[np.int64]:
     """Bin numbers 0..BINS-1 of normal scores, equally filled (equal values stay together), -1 for missing."""
     return np.where(np.isfinite(x), np.searchsorted(CUTS, np.nan_to_num(x)), -1)

@@ -12,12 +12,12 @@ from sklearn.metrics import roc_auc_score
 
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.graph import CausalGraph
-from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, SkillRecord, Training
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
 from care_core.learn.processes import answers
 from care_core.learn.relative import left_out_together, relative
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 
 BINS = 10
@@ -37,7 +37,7 @@ def cross_validated_skill(
     if not folds:
         return {}
     promised = held_out_probabilities(frame, schema, partial(_kept, graph), rng, folds=folds, n_jobs=n_jobs)
-    truth: dict[str, FloatArray] = {objective.name: met(objective, frame, schema) for objective in schema.objectives}
+    truth: dict[str, Floats] = {objective.name: met(objective, frame, schema) for objective in schema.objectives}
     truth["all"] = all_met(frame, schema)
     found = {name: score(promised[name], truth[name]) for name in promised}
     return {name: skill for name, skill in found.items() if skill is not None}
@@ -53,7 +53,7 @@ Learn = Callable[[pd.DataFrame, np.random.Generator], CausalGraph]
 
 def held_out_probabilities(
     frame: pd.DataFrame, schema: Schema, learn: Learn, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
-) -> dict[str, FloatArray]:
+) -> dict[str, Floats]:
     """Probability of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each.
 
     Args:
@@ -63,7 +63,7 @@ def held_out_probabilities(
     seeds = rng.integers(2**32, size=folds)
     calls = [partial(_predict, frame[fold != k], frame[fold == k], schema, learn, seeds[k]) for k in range(folds)]
     predicted = answers(calls, n_jobs)
-    promised: dict[str, FloatArray] = {}
+    promised: dict[str, Floats] = {}
     for k, values in enumerate(predicted):
         for name, held_out in values.items():
             promised.setdefault(name, np.full(len(frame), np.nan))[fold == k] = held_out
@@ -72,7 +72,7 @@ def held_out_probabilities(
 
 def _predict(
     runs: pd.DataFrame, left_out: pd.DataFrame, schema: Schema, learn: Learn, seed: int
-) -> Mapping[str, FloatArray]:
+) -> Mapping[str, Floats]:
     rng = np.random.default_rng(seed)
     return _probabilities(runs, left_out, schema, learn(runs, rng), rng)
 
@@ -84,10 +84,10 @@ def _folds(frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, folds:
     return np.asarray((rng.permutation(len(numbers)) % folds)[together.ravel()])
 
 
-def all_met(frame: pd.DataFrame, schema: Schema) -> FloatArray:
+def all_met(frame: pd.DataFrame, schema: Schema) -> Floats:
     """1 where every objective has a value that keeps its threshold, else 0; shape (n,)."""
     kept = [np.nan_to_num(met(objective, frame, schema), nan=0.0) == 1.0 for objective in schema.objectives]
-    answer: FloatArray = np.all(kept, axis=0).astype(float)
+    answer: Floats = np.all(kept, axis=0).astype(float)
     return answer
 
 
@@ -97,7 +97,7 @@ def _probabilities(
     schema: Schema,
     graph: CausalGraph,
     rng: np.random.Generator,
-) -> Mapping[str, FloatArray]:
+) -> Mapping[str, Floats]:
     outcomes, mechanisms = fit_outcomes(train, schema, graph, rng, effort=FOLD)
     training = Training(
         origin="", runs=len(train), seed=0, alpha=0.0, resamples=0,
@@ -130,12 +130,12 @@ def _probabilities(
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
-def _asked(query: CounterfactualQuery, configs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
+def _asked(query: CounterfactualQuery, configs: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
     promised = {name: query.p_ok(name, configs) for name in query.thresholds}
     return {**promised, "all": query.probability(configs)}
 
 
-def score(promised: FloatArray, truth: FloatArray) -> SkillRecord | None:
+def score(promised: Floats, truth: Floats) -> SkillRecord | None:
     """Log loss, Brier score, AUC, calibration and the base rate over the runs that have a truth; None without any."""
     known = np.isfinite(promised) & np.isfinite(truth)
     p, y = promised[known], truth[known]
@@ -153,7 +153,7 @@ def score(promised: FloatArray, truth: FloatArray) -> SkillRecord | None:
     )
 
 
-def reliability(p: FloatArray, y: FloatArray) -> list[tuple[float, float, int]]:
+def reliability(p: Floats, y: Floats) -> list[tuple[float, float, int]]:
     """Rows of (mean predicted probability, share that was met, runs), one for each tenth that holds any."""
     tenth = np.minimum((p * BINS).astype(int), BINS - 1)
     return [
@@ -163,7 +163,7 @@ def reliability(p: FloatArray, y: FloatArray) -> list[tuple[float, float, int]]:
     ]
 
 
-def calibration_error(p: FloatArray, y: FloatArray) -> float:
+def calibration_error(p: Floats, y: Floats) -> float:
     """Expected calibration error over tenths of the predicted probability."""
     rows = reliability(p, y)
     return sum(abs(predicted - seen) * count for predicted, seen, count in rows) / len(p)

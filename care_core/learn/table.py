@@ -7,19 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
 from care_core import limits
 from care_core.errors import LearningError, nearest
 from care_core.files import open_regular
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.tables.readiness import MIN_RUNS
 from care_core.tables.rows import CONDITIONS
 from care_core.variables import Role, Variable
 
-FloatArray = NDArray[np.float64]
 FORMATS = (".csv", ".parquet")
 STARTED = "log_start"
 """What runs of one site and day share (any value); when the log of a run began."""
@@ -69,7 +69,7 @@ def varying(frame: pd.DataFrame, names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name, differs in zip(asked, lowest < highest, strict=True) if differs)
 
 
-def normal_scores(values: ArrayLike) -> FloatArray:
+def normal_scores(values: ArrayLike) -> Floats:
     """Rank-based normal (van der Waerden) scores: ties get the score of their mean rank, NaN stays NaN.
 
     Metrics are counts with heavy tails, which plain Pearson correlation loses.
@@ -90,7 +90,7 @@ def normal_scores(values: ArrayLike) -> FloatArray:
     return np.asarray(np.where(known, scores / np.where(sd > 1e-12, sd, np.inf), np.nan))
 
 
-def _ranks(data: FloatArray) -> FloatArray:
+def _ranks(data: Floats) -> Floats:
     """Ranks of each column from 1, equal values share their mean, NaN stays NaN. A column without equal values needs no
     more than to be sorted, which takes a third of the time."""
     order = np.argsort(data, axis=0)
@@ -127,7 +127,7 @@ def _read(path: Path) -> pd.DataFrame:
     return frame
 
 
-def _numbers(column: pd.Series[float], variable: Variable, where: str) -> FloatArray:
+def _numbers(column: pd.Series[float], variable: Variable, where: str) -> Floats:
     """The column as floats, infinite values as missing."""
     numbers = pd.to_numeric(column, errors="coerce")
     values = np.asarray(numbers, dtype=float)

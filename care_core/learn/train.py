@@ -12,7 +12,6 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.effects import Effect, acceptable_values, along, average_causal_effect
 from care_core.causal.graph import CausalGraph
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import JITTER, LEAST, Mechanism, transformed
 from care_core.causal.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
 from care_core.causal.paths import CausalPath, Ways
@@ -41,6 +40,7 @@ from care_core.learn.robustness import robustness
 from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
 from care_core.learn.table import varying
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 
@@ -153,14 +153,14 @@ class _Measured(Record):
     """Eq. 1 on the whole table, and its magnitude in each resample, shape (EFFECT_RESAMPLES,)."""
 
     effect: Effect
-    resampled: FloatArray
+    resampled: Floats
 
     def interval(self, support: float) -> tuple[float, float]:
         """5 % and 95 % of the magnitudes in resamples."""
         return _interval(self.resampled, support)
 
 
-def _interval(resampled: FloatArray, support: float) -> tuple[float, float]:
+def _interval(resampled: Floats, support: float) -> tuple[float, float]:
     """5 % and 95 % of the magnitudes, the share of resamples in which the graph lacks the effect counted as zero."""
     low, high = (
         0.0 if share <= 1 - support else np.quantile(resampled, 1 - (1 - share) / support) for share in (0.05, 0.95)
@@ -197,7 +197,7 @@ def _measure(
     cross = mechanism.kernel(mechanism.scaled(stacked), mechanism.points)
     latent = mechanism.mean + mechanism.scale * (cross @ weights) + mechanism.known(stacked)[:, None]
 
-    def effects(answer: FloatArray) -> list[Effect]:
+    def effects(answer: Floats) -> list[Effect]:
         responses = [part.reshape(len(background), -1).mean(axis=0) for part in np.split(answer, ends)]
         return [average_causal_effect(response, sd) for response in responses]
 
@@ -206,7 +206,7 @@ def _measure(
     return {name: _Measured(whole[i], magnitudes[:, i]) for i, name in enumerate(names)}
 
 
-def _reweighted(mechanism: Mechanism, among: FloatArray, rows: NDArray[np.int64]) -> FloatArray:
+def _reweighted(mechanism: Mechanism, among: Floats, rows: NDArray[np.int64]) -> Floats:
     """Weights of all training points, shape (n,), when the mechanism rests on a resample and its kernel is kept.
 
     Args:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.kernel import Kernel
 from care_core.causal.mechanisms import LEAST, Mechanism, solve, transformed
 from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.errors import LearningError
@@ -28,6 +28,7 @@ from care_core.learn.outcomes import causes_of, find_stages, groups_that_move_to
 from care_core.learn.relative import ENOUGH_PARTS, missions_of, relative
 from care_core.learn.screening import screen_options
 from care_core.learn.train import Learned, TrainSettings, assemble
+from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.variables import Role
@@ -181,7 +182,7 @@ def _met(name: str, source: Model, frame: pd.DataFrame) -> pd.Series[float]:
     return frame[name].fillna(source.summaries[name].quantile(0.5))
 
 
-def _observed(key: str, source: Model, schema: Schema, frame: pd.DataFrame) -> tuple[NDArray[np.bool_], FloatArray]:
+def _observed(key: str, source: Model, schema: Schema, frame: pd.DataFrame) -> tuple[Bools, Floats]:
     """Which rows say something of a mechanism's target, and what; both of shape (n,)."""
     name = key.removeprefix("stage:")
     values = frame[name].to_numpy(dtype=float)
@@ -198,8 +199,8 @@ def _observed(key: str, source: Model, schema: Schema, frame: pd.DataFrame) -> t
 
 def started_from(
     source: Mechanism,
-    x: FloatArray,
-    y: FloatArray,
+    x: Floats,
+    y: Floats,
     inputs: Inputs,
     groups: NDArray[np.int64],
     rng: np.random.Generator,
@@ -223,7 +224,7 @@ def started_from(
     return moved.mechanism if moved.loss <= beside.loss else beside.mechanism
 
 
-def _moved(source: Mechanism, x: FloatArray, y: FloatArray, inputs: Inputs, groups: NDArray[np.int64]) -> Fitted:
+def _moved(source: Mechanism, x: Floats, y: Floats, inputs: Inputs, groups: NDArray[np.int64]) -> Fitted:
     """The source moved by what the target's runs have in common: their mean error, shrunk towards none by as much as
     chance alone explains of it, counted in missions (James and Stein 1961, positive part). It is as unsure as the
     source, whose errors were seen on hundreds of runs, or more where these runs say so."""
@@ -267,8 +268,8 @@ def _moved(source: Mechanism, x: FloatArray, y: FloatArray, inputs: Inputs, grou
 
 def _with_regression(
     source: Mechanism,
-    x: FloatArray,
-    y: FloatArray,
+    x: Floats,
+    y: Floats,
     inputs: Inputs,
     groups: NDArray[np.int64],
     effort: Effort,
@@ -288,21 +289,21 @@ def _with_regression(
     return Fitted(replace(carried, calibration=calibration), _loss_of_odds(calibration, held_out, y))
 
 
-def _coded(source: Mechanism, y: FloatArray) -> FloatArray:
+def _coded(source: Mechanism, y: Floats) -> Floats:
     return 2.0 * y - 1.0 if source.binary else transformed(y, source.transform)
 
 
-def _loss_of(errors: FloatArray, sd: FloatArray) -> float:
+def _loss_of(errors: Floats, sd: Floats) -> float:
     return float((np.log(sd) + 0.5 * (errors / sd) ** 2).mean())
 
 
-def _loss_of_odds(calibration: FloatArray, latent: FloatArray, y: FloatArray) -> float:
+def _loss_of_odds(calibration: Floats, latent: Floats, y: Floats) -> float:
     slope, offset = calibration
     logit = slope * latent + offset
     return float(np.logaddexp(0, np.where(y > 0.5, -logit, logit)).mean())
 
 
-def _share(before: FloatArray, coded: FloatArray) -> float:
+def _share(before: Floats, coded: Floats) -> float:
     """Slope of the target on the source's prediction, drawn towards 1 as by `TRUST` runs that obey the source."""
     centred = before - before.mean()
     variance = float(centred @ centred) / len(before)

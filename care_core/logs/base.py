@@ -12,8 +12,9 @@ from care_core.records import Record
 from care_core.run import Damage, Setting
 
 if TYPE_CHECKING:  # a log is told by its first bytes before anything needs numbers
-    import numpy as np
     from numpy.typing import NDArray
+
+    from care_core.numbers import Bools, Floats
 
 Wanted = Mapping[str, Sequence[str]]
 """Channel name to the fields to decode; ROS fields are dotted paths such as `pose.pose.position.x`."""
@@ -59,10 +60,10 @@ class LazyColumns(Mapping[str, Any]):
 
     @property
     @abstractmethod
-    def t(self) -> NDArray[np.float64]: ...
+    def t(self) -> Floats: ...
 
     @abstractmethod
-    def where(self, mask: NDArray[np.bool_] | slice) -> LazyColumns: ...
+    def where(self, mask: Bools | slice) -> LazyColumns: ...
 
     @abstractmethod
     def kind(self, name: str) -> Kind: ...
@@ -75,12 +76,12 @@ class Table(Record, eq=False):
     object (str) for text, object for whatever else the message holds. Arrays are read-only by convention.
     """
 
-    times: NDArray[np.float64] | None
+    times: Floats | None
     """None where the columns are lazy: those of a large log are not all held, see `t`."""
     columns: Mapping[str, NDArray[Any]]
 
     @property
-    def t(self) -> NDArray[np.float64]:
+    def t(self) -> Floats:
         if self.times is not None:
             return self.times
         assert isinstance(self.columns, LazyColumns)
@@ -114,7 +115,7 @@ class Table(Record, eq=False):
             return self.where(slice(int(low), int(high)))
         return self.where((t >= start_s) & (t <= end_s))
 
-    def where(self, mask: NDArray[np.bool_] | slice) -> Table:
+    def where(self, mask: Bools | slice) -> Table:
         """The messages of a mask, or of a range of rows."""
         if not isinstance(mask, slice) and mask.all():
             return self

@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.numbers import median
+from care_core.numbers import Bools, Floats, median
 from care_core.records import Record, Struct
 from care_core.run import Damage
 
-Floats = NDArray[np.float64]
 Offsets = NDArray[np.integer[Any]]
 
 BACK_S = 1.0
@@ -72,9 +71,7 @@ class OwnClock(Record, eq=False):
         return float(late_s[row:].min() - median(late_s[before]))
 
 
-def find_clock(
-    stamps_s: Floats, places: Offsets, own: OwnClock | None = None
-) -> tuple[Clock, NDArray[np.bool_], list[Damage]]:
+def find_clock(stamps_s: Floats, places: Offsets, own: OwnClock | None = None) -> tuple[Clock, Bools, list[Damage]]:
     """The clock of a log, the records whose stamp is impossible (a mask), and where the clock jumped.
 
     Args:

@@ -34,10 +34,9 @@ from care_core.logs.base import Channel, Kind, LazyColumns, Table, Wanted
 from care_core.logs.clock import Clock, clock_of
 from care_core.logs.damage import summarised
 from care_core.logs.file_windows import Bytes, FileArray, Offsets, give_back, stored_in
+from care_core.numbers import Bools, Floats
 from care_core.records import Record
 from care_core.run import Damage, Setting
-
-Floats = NDArray[np.float64]
 
 _HEADER = b"\xa3\x95"
 _FMT, _FMT_LENGTH = 0x80, 89
@@ -248,7 +247,7 @@ class _RecordColumns(LazyColumns):
     def kind(self, name: str) -> Kind:
         return self._form.fields[name].kind
 
-    def where(self, mask: NDArray[np.bool_] | slice) -> _RecordColumns:
+    def where(self, mask: Bools | slice) -> _RecordColumns:
         rows: range | Offsets
         if isinstance(mask, slice):
             rows = self._rows[mask]
@@ -388,14 +387,14 @@ class DataFlashLog:
                     t[rows] = self._clock.seconds(_stamps(piece, inner, form), offsets[rows])
         return found
 
-    def _last_known_time(self, offsets: Offsets) -> NDArray[np.float64]:
+    def _last_known_time(self, offsets: Offsets) -> Floats:
         """Time of the last stamped record before each of these bytes: old firmwares stamped few of their messages."""
         places, seconds = self._timeline
         before = np.searchsorted(places, offsets) - 1
         return np.where(before >= 0, seconds[before], 0.0) if len(places) else np.full(len(offsets), np.nan)
 
     @cached_property
-    def _timeline(self) -> tuple[Offsets, NDArray[np.float64]]:
+    def _timeline(self) -> tuple[Offsets, Floats]:
         starts = np.concatenate(list(self._offsets.values()))
         types = np.repeat(
             np.array(list(self._offsets), dtype=np.uint8), [len(offsets) for offsets in self._offsets.values()]
@@ -407,7 +406,7 @@ class DataFlashLog:
         places = np.concatenate([places for _, places in pieces])
         return places, self._clock.seconds(np.concatenate([stamps for stamps, _ in pieces]), places)
 
-    def _stamped(self, data: FileArray, starts: Offsets, types: Bytes) -> Iterator[tuple[NDArray[np.float64], Offsets]]:
+    def _stamped(self, data: FileArray, starts: Offsets, types: Bytes) -> Iterator[tuple[Floats, Offsets]]:
         """Of the records that carry a stamp, window by window: their stamps in seconds, and their places."""
         groups = _alike(form for found in self._formats.values() for form in found)
         for ((rows, near),), piece in data.windows([starts], _LONGEST_RECORD):
@@ -582,7 +581,7 @@ def _follow_records(
     return _moved(starts, keep), _moved(types, keep), gaps
 
 
-def _moved(column: NDArray[Any], keep: NDArray[np.bool_]) -> NDArray[Any]:
+def _moved(column: NDArray[Any], keep: Bools) -> NDArray[Any]:
     """The entries of a mask, moved to the front of the array: a large log's index is not held twice."""
     at = 0
     for low in range(0, len(column), _PIECE):
@@ -628,7 +627,7 @@ def _decoded(values: NDArray[Any], field: RecordField) -> NDArray[Any]:
     return found
 
 
-def _stamps(piece: Bytes, places: Offsets, form: Format) -> NDArray[np.float64]:
+def _stamps(piece: Bytes, places: Offsets, form: Format) -> Floats:
     """Timestamps in seconds of the records at places of a window, of a declaration that has one."""
     assert form.time_field is not None
     name, ticks = form.time_field
@@ -636,10 +635,10 @@ def _stamps(piece: Bytes, places: Offsets, form: Format) -> NDArray[np.float64]:
     return np.asarray(_decoded(stored_in(piece, places, (field.offset, field.dtype)), field) / ticks, dtype=np.float64)
 
 
-def _alike(forms: Iterable[Format]) -> list[tuple[Format, NDArray[np.bool_]]]:
+def _alike(forms: Iterable[Format]) -> list[tuple[Format, Bools]]:
     """Of the types with a timestamp, by their last declaration, those together that keep it at the same place in the
     same way: one of them, and which they are."""
-    found: dict[tuple[RecordField, float], tuple[Format, NDArray[np.bool_]]] = {}
+    found: dict[tuple[RecordField, float], tuple[Format, Bools]] = {}
     for form in {form.type: form for form in forms if form.time_field is not None}.values():
         assert form.time_field is not None
         name, ticks = form.time_field

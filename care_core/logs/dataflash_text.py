@@ -24,9 +24,9 @@ from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
 from care_core.logs.dataflash import time_field
 from care_core.logs.file_windows import FileArray
+from care_core.numbers import Bools, Floats
 from care_core.run import Damage, Setting
 
-Floats = NDArray[np.float64]
 Offsets = NDArray[np.int64]
 
 _TEXT_CODES = frozenset("nNZ")
@@ -180,7 +180,7 @@ class DataFlashTextLog:
             self._lines[name] = places[sound]
         return sorted(broken)
 
-    def _sound(self, name: str, places: Offsets) -> NDArray[np.bool_]:
+    def _sound(self, name: str, places: Offsets) -> Bools:
         """Which of the lines are what their FMT says."""
         sound = np.ones(len(places), dtype=bool)
         for at in range(0, len(places), _PIECE):

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.errors import LogError
 from care_core.logs import formats, shared_id
@@ -42,6 +41,7 @@ from care_core.logs.mavlink_packets import (
     stamps,
     wanted_extras,
 )
+from care_core.numbers import Floats
 from care_core.run import Damage, Setting
 
 _HEARTBEAT, _PARAM_VALUE, _STATUSTEXT, _AUTOPILOT_VERSION = 0, 22, 253, 148
@@ -180,7 +180,7 @@ class MavlinkLog:
             return None
         return datetime.fromtimestamp(self._first_stamp_s, timezone.utc).isoformat(timespec="seconds")
 
-    def _times(self, data: FileArray, start: Offsets) -> NDArray[np.float64]:
+    def _times(self, data: FileArray, start: Offsets) -> Floats:
         return self._clock.seconds(stamps(data, start), start)
 
     def _rank(self, data: FileArray, packets: Packets) -> tuple[Sender, ...]:

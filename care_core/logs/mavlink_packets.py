@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from care_core.logs.ardupilot import text_of
 from care_core.logs.file_windows import Bytes, FileArray
+from care_core.numbers import Floats
 from care_core.records import Record
 
 Offsets = NDArray[np.int64]
@@ -118,7 +119,7 @@ def stamped(data: FileArray) -> bytes | None:
     return made.tobytes()
 
 
-def _boot_times(data: FileArray, packets: Packets) -> NDArray[np.float64] | None:
+def _boot_times(data: FileArray, packets: Packets) -> Floats | None:
     """When each packet was sent, seconds since the vehicle started; None where none says so."""
     rows, own = boot_clock(data, packets)
     if not len(rows):
@@ -128,7 +129,7 @@ def _boot_times(data: FileArray, packets: Packets) -> NDArray[np.float64] | None
     return np.asarray(np.interp(np.arange(len(packets)), rows, own), np.float64)
 
 
-def boot_clock(data: FileArray, packets: Packets) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+def boot_clock(data: FileArray, packets: Packets) -> tuple[NDArray[np.intp], Floats]:
     """Which packets of the sender who does most often say how long ago it was started, and what they say, in s; shapes
     (k,), both empty where nobody does."""
     known = np.full(len(packets), np.nan)
@@ -249,7 +250,7 @@ def _crc_table() -> NDArray[np.uint16]:
     return table
 
 
-def stamps(data: FileArray, start: Offsets) -> NDArray[np.float64]:
+def stamps(data: FileArray, start: Offsets) -> Floats:
     """The times before packets, in seconds."""
     return np.asarray(data.at(start, ">u8") / 1e6, dtype=np.float64)
 

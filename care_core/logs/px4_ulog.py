@@ -41,10 +41,8 @@ from care_core.logs.ulog_records import (
     each_of,
     read_contents,
 )
-from care_core.numbers import median
+from care_core.numbers import Bools, Floats, median
 from care_core.run import Damage, Setting
-
-Floats = NDArray[np.float64]
 
 MESSAGES = "logged_messages"
 SOURCE = "PX4 parameters"
@@ -366,7 +364,7 @@ def _first_us(start_us: int, stamps: Iterable[Floats]) -> float:
     return first if 0 <= middle - first <= PAUSE_S * 1e6 else middle
 
 
-def _believable(t: Floats) -> NDArray[np.bool_]:
+def _believable(t: Floats) -> Bools:
     """Which times of a topic can be: within a day of the log's start, and in step with their neighbours."""
     steps = np.diff(t)
     if t[-1] <= PAUSE_S and (not len(steps) or (steps.min() >= -BACK_S and steps.max() <= STEP_S)):

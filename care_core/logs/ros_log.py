@@ -27,6 +27,7 @@ from care_core.logs.ros_message import Buffer, Decoder, MalformedMessageError, s
 from care_core.logs.ros_metadata import Metadata
 from care_core.logs.ros_settings import setting_fields, settings_in
 from care_core.logs.ros_types import cdr_types
+from care_core.numbers import Floats
 from care_core.records import Record, Struct, field, replace
 from care_core.run import Damage, Setting
 from care_core.text import log_time
@@ -239,7 +240,7 @@ class RosLog:
                     times.append(self._kept(part.times_ns[number]))
         return tuple(_channel(topic, types, times) for topic, (types, times) in sorted(by_topic.items()))
 
-    def times(self) -> Mapping[str, NDArray[np.float64]]:
+    def times(self) -> Mapping[str, Floats]:
         """Per topic the record times of its messages, s, in order. Nothing is decoded."""
         found: dict[str, list[NDArray[np.int64]]] = {}
         for part in self._parts:
@@ -280,7 +281,7 @@ class RosLog:
             }
         return {topic: _table(kinds[topic], pieces.get(topic, []), self._low_ns) for topic in wanted if topic in kinds}
 
-    def sampled_times(self, topic: str, at_most: int) -> NDArray[np.float64]:
+    def sampled_times(self, topic: str, at_most: int) -> Floats:
         """Record times, s, of the messages of a topic that `read` decodes where it may decode so many of it."""
         times = [
             part.times_ns[number][self._wanted(part, number, {topic: at_most})]

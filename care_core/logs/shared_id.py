@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.logs.base import Table
+from care_core.numbers import Floats
 
 READS = {
     "HEARTBEAT": ("type",),
@@ -39,7 +39,7 @@ def sharing(tables: Mapping[str, Table]) -> str:
     return ""
 
 
-def _turns(values: NDArray[np.float64], apart: float) -> bool:
+def _turns(values: Floats, apart: float) -> bool:
     """Whether a series goes to and fro between two levels, again and again."""
     steps = np.diff(values)
     large = steps[np.abs(steps) > apart]

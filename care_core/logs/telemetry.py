@@ -11,13 +11,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.logs import formats
 from care_core.logs.base import Channel, Log, Table, Wanted
 from care_core.records import Record
 
-Floats = NDArray[np.float64]
 Sample = tuple[float, tuple[Any, ...]]
 
 _ARMED_FLAG = 128

@@ -20,6 +20,7 @@ from care_core import limits
 from care_core.logs import file_windows
 from care_core.logs.file_windows import Bytes, FileArray, Offsets
 from care_core.logs.ulog_formats import Format, Layout, Layouts, UnusableFormatError
+from care_core.numbers import Bools
 from care_core.records import Record, Struct, field
 from care_core.run import Damage
 
@@ -112,7 +113,7 @@ class _Candidates(Struct, eq=False):
     numbers: NDArray[np.uint16]
     breaks: NDArray[np.intp]
     """Those behind which, by their length, the next does not begin."""
-    is_record: NDArray[np.bool_]
+    is_record: Bools
     """Which of them the walk came to."""
 
 

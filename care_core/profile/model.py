@@ -17,7 +17,7 @@ import numpy as np
 
 from care_core import limits
 from care_core.causal.graph import CausalGraph
-from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.kernel import Kernel
 from care_core.causal.mechanisms import Averaging, Mechanism, Transform
 from care_core.causal.model import (
     EdgeRecord,
@@ -32,7 +32,7 @@ from care_core.causal.model import (
 from care_core.causal.nominal import FORMULAS, Nominal
 from care_core.errors import ProfileError
 from care_core.files import read_small_bytes, replace_file, sync_folder
-from care_core.numbers import six_digits
+from care_core.numbers import Floats, six_digits
 from care_core.records import Record, UnfitError, asdict, field, plain, read_json, replace
 
 ARCHIVE = b"PK\x03\x04"
@@ -240,7 +240,7 @@ def _model(content: bytes, arrays: bytes) -> Model:
     return _to_model(record, graph, mechanisms)
 
 
-def _unpacked(content: bytes) -> Mapping[str, FloatArray]:
+def _unpacked(content: bytes) -> Mapping[str, Floats]:
     if not content.startswith(ARCHIVE):
         raise ValueError(f"{ARRAYS_FILE} is not an archive of arrays")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -254,7 +254,7 @@ def _content(path: Path) -> bytes:
     return read_small_bytes(path, limits.MODEL_BYTES)
 
 
-def _array(name: str, stored: bytes) -> FloatArray:
+def _array(name: str, stored: bytes) -> Floats:
     """The numbers of a `.npy` file. numpy's own reader makes room for what the header claims before it looks."""
     begin = 10 + int.from_bytes(stored[8:10], "little")
     if not stored.startswith(b"\x93NUMPY\x01\x00") or len(stored) < begin:
@@ -303,7 +303,7 @@ def _to_model(record: _ModelFile, graph: CausalGraph, mechanisms: Mapping[str, M
     )
 
 
-def _mechanisms(records: Mapping[str, _MechanismRecord], arrays: Mapping[str, FloatArray]) -> Mapping[str, Mechanism]:
+def _mechanisms(records: Mapping[str, _MechanismRecord], arrays: Mapping[str, Floats]) -> Mapping[str, Mechanism]:
     """Every mechanism by its key, each with the one that it starts from, which has no entry of its own."""
 
     def read(key: str) -> Mechanism:
@@ -339,8 +339,8 @@ def _averaging(key: str, record: _MechanismRecord) -> Averaging | None:
     return Averaging(record.averaging.count, record.averaging.usual, record.averaging.share)
 
 
-def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArray]) -> Mechanism:
-    def floats(name: str) -> FloatArray:
+def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, Floats]) -> Mechanism:
+    def floats(name: str) -> Floats:
         array = arrays[f"{key}/{name}"]
         if not np.isfinite(array).all():
             raise ValueError(f"{key}/{name} holds values that are not finite")

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from care_core.logs.clock import OwnClock, clock_of, find_clock
+from care_core.numbers import Floats
 from tests.whole import examples
 
 
@@ -16,7 +17,7 @@ def places(n: int) -> NDArray[np.int64]:
     return np.arange(n, dtype=np.int64) * 40
 
 
-def seconds(n: int, since: float = 0.0, step: float = 1.0) -> NDArray[np.float64]:
+def seconds(n: int, since: float = 0.0, step: float = 1.0) -> Floats:
     return np.asarray(since + np.arange(n) * step, dtype=np.float64)
 
 

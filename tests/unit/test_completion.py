@@ -12,7 +12,8 @@ from care_core.learn.completion import complete
 from care_core.learn.constraints import Constraints
 from care_core.learn.regression import Regressions, features
 from care_core.learn.structure import learn_structure
-from care_core.learn.table import FloatArray, normal_scores
+from care_core.learn.table import normal_scores
+from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.variables import Role
 from tests.simulated import schema_of
@@ -25,7 +26,7 @@ def empty(schema: Schema, *edges: tuple[str, str]) -> CausalGraph:
     return CausalGraph(tuple(schema.variables), frozenset(edges))
 
 
-def table(count: int, seed: int, **columns: FloatArray) -> pd.DataFrame:
+def table(count: int, seed: int, **columns: Floats) -> pd.DataFrame:
     """Three options drawn evenly from -1 to 1, and the columns."""
     rng = np.random.default_rng(seed)
     made: pd.DataFrame = pd.DataFrame({**{name: rng.uniform(-1, 1, count) for name in "abc"}, **columns})

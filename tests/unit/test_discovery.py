@@ -15,6 +15,7 @@ from care_core.errors import LearningError
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import FisherZ, Mark, Pag, discover
 from care_core.learn.structure import learn_structure
+from care_core.numbers import Floats
 from care_core.variables import Role
 from tests.simulated import simulate
 from tests.whole import examples
@@ -30,7 +31,7 @@ class Oracle:
     def __init__(self, graph: CausalGraph, names: Sequence[str]) -> None:
         self.graph, self.names = graph, names
 
-    def p_values(self, x: NDArray[np.int64], y: NDArray[np.int64], given: NDArray[np.int64]) -> NDArray[np.float64]:
+    def p_values(self, x: NDArray[np.int64], y: NDArray[np.int64], given: NDArray[np.int64]) -> Floats:
         return np.array(
             [
                 float(self.graph.m_separated(self.names[i], self.names[j], [self.names[k] for k in held]))

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import check_grad
 from threadpoolctl import threadpool_limits
 
-from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.kernel import Kernel
 from care_core.causal.mechanisms import JITTER, Mechanism
 from care_core.errors import LearningError
 from care_core.learn.fitting import (
@@ -18,6 +18,7 @@ from care_core.learn.fitting import (
     fit_mechanism,
 )
 from care_core.learn.skill import calibration_error
+from care_core.numbers import Floats
 from care_core.records import replace
 
 RNG = np.random.default_rng
@@ -28,13 +29,13 @@ def inputs(count: int, *logs: int) -> Inputs:
     return Inputs.all_read(tuple("abcdefgh"[:count]), np.isin(np.arange(count), logs))
 
 
-def fitted(x: FloatArray, y: FloatArray, *, binary: bool = False, effort: Effort = FULL) -> Mechanism:
+def fitted(x: Floats, y: Floats, *, binary: bool = False, effort: Effort = FULL) -> Mechanism:
     with threadpool_limits(1):
         return fit_mechanism(x, y, inputs(x.shape[1]), binary=binary, rng=RNG(0), effort=effort)
 
 
 def test_recovers_a_known_function_from_clean_data() -> None:
-    def truth(x: FloatArray) -> FloatArray:
+    def truth(x: Floats) -> Floats:
         return np.asarray(50 + np.sin(3 * x[:, 0]) + x[:, 1] ** 2 + x[:, 0] * x[:, 2])
 
     x, new = RNG(0).uniform(-1, 1, (200, 4)), RNG(1).uniform(-0.9, 0.9, (200, 4))
@@ -94,7 +95,7 @@ def test_probabilities_are_better_than_the_base_rate_and_calibrated() -> None:
     probability, seen = m.probability(x[300:]), y[300:]
     base = y[:300].mean()
 
-    def log_loss(p: FloatArray) -> float:
+    def log_loss(p: Floats) -> float:
         return float(-(seen * np.log(p) + (1 - seen) * np.log(1 - p)).mean())
 
     assert log_loss(probability) < 0.8 * log_loss(np.full(1000, base))
@@ -147,7 +148,7 @@ def test_log_inputs_act_as_ratios() -> None:
         (np.ones(5), "identity"),
     ],
 )
-def test_the_transform_takes_the_skew_away(y: FloatArray, expected: str) -> None:
+def test_the_transform_takes_the_skew_away(y: Floats, expected: str) -> None:
     assert best_transform(y) == expected
 
 
@@ -155,10 +156,10 @@ def test_the_gradient_is_the_gradient() -> None:
     points, targets = RNG(0).normal(size=(25, 3)), RNG(1).normal(size=25)
     posterior = _Posterior(points, targets)
 
-    def value(theta: FloatArray) -> float:
+    def value(theta: Floats) -> float:
         return posterior(theta)[0]
 
-    def gradient(theta: FloatArray) -> FloatArray:
+    def gradient(theta: Floats) -> Floats:
         return posterior(theta)[1]
 
     for seed in range(3):

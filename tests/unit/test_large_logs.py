@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.application import progress_estimate as watched
@@ -21,6 +20,7 @@ from care_core.logs.mcap_records import ENTRY
 from care_core.logs.message_index import MessageIndex
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
+from care_core.numbers import Bools
 
 PICTURES, SMALL = 12, 5
 FLIGHT = Path(__file__).parents[2] / "samples" / "arducopter_failed.BIN"
@@ -283,7 +283,7 @@ def test_what_is_held_of_a_dataflash_log_changes_no_value(monkeypatch: pytest.Mo
     for name, fields in wanted.items():
         own, other = held[name], read[name]
         mask = np.arange(len(own)) % 5 > 1
-        rows: list[slice | NDArray[np.bool_]] = [slice(None), slice(7, 20), slice(2, None, 3), slice(0, 0)]
+        rows: list[slice | Bools] = [slice(None), slice(7, 20), slice(2, None, 3), slice(0, 0)]
         rows += [mask, np.zeros(len(own), dtype=bool)]
         pairs = [(own.where(some), other.where(some)) for some in rows]
         pairs.append((own.where(mask).where(slice(3, 9)), other.where(mask).where(slice(3, 9))))

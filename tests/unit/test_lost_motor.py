@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.flight import Flight
@@ -15,10 +14,10 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.examining import examine
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.vehicles import Motor
+from care_core.numbers import Floats
 from care_core.run import Setting
 from tests.falls import ARMED_S, FAILS_S, Fall, dataflash_log, efficiency, fly, frame, px4_log, settings
 
-Floats = NDArray[np.float64]
 QUAD_X, QUAD_PLUS, HEXA_X, OCTA_PLUS, Y6 = (1, 1), (1, 0), (2, 1), (3, 0), (5, 0)
 
 

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from care_core.causal import kernel as kernels
-from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.kernel import Kernel
 from care_core.causal.mechanisms import JITTER, LEAST, TAIL, Mechanism, Transform, columns, restored, solve, transformed
+from care_core.numbers import Floats
 from care_core.records import replace
 
 SETTINGS = st.floats(-1e3, 1e3)
@@ -44,7 +45,7 @@ def test_restored_undoes_transformed(transform: Transform) -> None:
 
 
 @given(arrays(float, (4, 2), elements=SETTINGS))
-def test_probability_stay_off_zero_and_one(x: FloatArray) -> None:
+def test_probability_stay_off_zero_and_one(x: Floats) -> None:
     probability = mechanism(binary=True).probability(x)
     assert ((probability >= TAIL) & (probability <= 1 - TAIL)).all()
 
@@ -57,14 +58,14 @@ def test_the_distribution_of_errors_never_falls(z: list[float]) -> None:
 
 
 @given(arrays(float, (5, 2), elements=SETTINGS), st.permutations(range(5)))
-def test_predictions_do_not_depend_on_the_order_of_rows(x: FloatArray, order: list[int]) -> None:
+def test_predictions_do_not_depend_on_the_order_of_rows(x: Floats, order: list[int]) -> None:
     m = mechanism()
     np.testing.assert_allclose(m.latent(x)[order], m.latent(x[order]), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(m.latent_sd(x)[order], m.latent_sd(x[order]), rtol=1e-9, atol=1e-12)
 
 
 @given(arrays(float, (6, 2), elements=st.floats(-5, 5)))
-def test_a_covariance_is_symmetric_and_never_negative(x: FloatArray) -> None:
+def test_a_covariance_is_symmetric_and_never_negative(x: Floats) -> None:
     kernel = mechanism().kernel
     covariance = kernel(x, x)
     np.testing.assert_allclose(covariance, covariance.T)
@@ -118,7 +119,7 @@ def test_points_among_themselves_are_the_same_numbers(n: int) -> None:
     np.testing.assert_array_equal(kernel.among(points), kernel(points, points))
 
 
-def covariance(kernel: Kernel, a: FloatArray, b: FloatArray) -> FloatArray:
+def covariance(kernel: Kernel, a: Floats, b: Floats) -> Floats:
     """The formula of the kernel, word by word."""
     each = np.exp(-(((a[:, None] - b) * kernel.relevance) ** 2) / 2)
     additive = (each.sum(axis=2) + kernel.idle) / (len(kernel.relevance) + kernel.idle)
@@ -130,7 +131,7 @@ def covariance(kernel: Kernel, a: FloatArray, b: FloatArray) -> FloatArray:
     arrays(float, (4, 3), elements=st.floats(-3, 3)),
     st.integers(0, 2),
 )
-def test_values_that_many_points_share_change_no_covariance(b: FloatArray, a: FloatArray, idle: int) -> None:
+def test_values_that_many_points_share_change_no_covariance(b: Floats, a: Floats, idle: int) -> None:
     kernel = Kernel(np.array([0.3, 1.0, 2.0]), 0.7, 0.4, 0.1, idle)
     np.testing.assert_allclose(kernel(a, b), covariance(kernel, a, b), rtol=1e-12)
     np.testing.assert_allclose(kernel.among(b), covariance(kernel, b, b), rtol=1e-12)

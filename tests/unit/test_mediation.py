@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.kernel import Kernel
 from care_core.learn import mediation
 from care_core.learn.fitting import Effort, left_out
 from care_core.learn.outcomes import fit_outcomes, fit_total
+from care_core.numbers import Floats
 from tests.simulated import simulate
 
 QUICK = Effort(points=150, iterations=10)
@@ -26,7 +27,7 @@ def test_many_runs_tell_what_some_of_them_tell(monkeypatch: pytest.MonkeyPatch) 
         mechanisms[metric.name] = found
     sizes: list[int] = []
 
-    def counted(kernel: Kernel, points: FloatArray, *others: Any) -> object:
+    def counted(kernel: Kernel, points: Floats, *others: Any) -> object:
         sizes.append(len(points))
         return left_out(kernel, points, *others)
 

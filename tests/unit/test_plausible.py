@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.ardupilot.messages import MESSAGES
-from care_core.ecosystems.plausible import Floats, clock_doubt, set_forward, sound
+from care_core.ecosystems.plausible import clock_doubt, set_forward, sound
 from care_core.logs.base import Table
+from care_core.numbers import Floats
 
 
 def battery(volts: list[float], **more: list[float]) -> dict[str, Table]:

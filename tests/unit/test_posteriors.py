@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from care_core.causal import posteriors as module
-from care_core.causal.kernel import Factor, FloatArray
+from care_core.causal.kernel import Factor
 from care_core.causal.mechanisms import Averaging
 from care_core.causal.posteriors import PosteriorCache
+from care_core.numbers import Floats
 from care_core.records import replace
 from tests.unit.test_mechanisms import mechanism
 
@@ -29,7 +30,7 @@ def test_no_row_is_worked_out_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
     original = Factor.whitened
 
-    def whitened(self: Factor, rows: FloatArray) -> FloatArray:
+    def whitened(self: Factor, rows: Floats) -> Floats:
         asked.append(len(rows))
         return original(self, rows)
 

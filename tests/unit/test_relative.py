@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from care_core.causal.kernel import FloatArray
 from care_core.learn.fitting import Effort, Inputs, fit, left_out
 from care_core.learn.outcomes import fit_total, inputs_of, met
 from care_core.learn.relative import left_out_together, missions_of, needs, relative
 from care_core.learn.repeats import repeated
 from care_core.learn.structure import learn_structure
+from care_core.numbers import Floats
 from care_core.profile.reading import parse_schema
 from care_core.profile.schema import Schema
 
@@ -108,7 +108,7 @@ def test_what_only_the_nominal_needs_is_not_read() -> None:
     }  # fmt: skip
 
 
-def grouped() -> tuple[FloatArray, FloatArray, np.ndarray[tuple[int], np.dtype[np.int64]]]:
+def grouped() -> tuple[Floats, Floats, np.ndarray[tuple[int], np.dtype[np.int64]]]:
     """Ten groups with an offset each that their place tells."""
     rng = np.random.default_rng(0)
     groups = np.repeat(np.arange(10), 8)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from care_core.ecosystems.ardupilot.checks import spectrum
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table
+from care_core.numbers import Floats
 from tests.flights import DOWN_S, HOVER, UP_S
 from tests.unit.test_settings_shown import MadeWithDefaults
 
@@ -30,7 +31,7 @@ class Sampled(MadeWithDefaults):
         self.settings |= settings
         self.line_hz, self.dps, self.raw = line_hz, dps, raw
 
-    def samples(self, count: int) -> NDArray[np.float64]:
+    def samples(self, count: int) -> Floats:
         """Of three axes, in rad/s; the line has an effective value of `dps` on the first."""
         made = self.rng.normal(0.0, 0.002, (count, 3))
         made[:, 0] += (

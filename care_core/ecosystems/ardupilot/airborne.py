@@ -16,12 +16,12 @@ import numpy as np
 from care_core.ecosystems.ardupilot import sources
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.recorded import UNKNOWN_MODE
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts, runs
+from care_core.ecosystems.ardupilot.spans import Span, during, parts, runs
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median, pieces
+from care_core.numbers import Bools, Floats, median, pieces
 
 READS: Wanted = {
     "CTUN": ("ThO", "Alt", "BAlt", "DAlt"),
@@ -311,7 +311,7 @@ class Airborne(Armed):
     def _hits_after(self, start: float, end: float) -> bool:
         return self.hit is not None and start <= self.hit.time_s <= end + _HIT_LOST_S
 
-    def _is_driven(self, t: Floats) -> Mask:
+    def _is_driven(self, t: Floats) -> Bools:
         """Where the motors were to lift it, in a mode in which not every attitude is meant."""
         driven, throttle = during(self.armed, t), self.throttle
         for rows in pieces(len(t)):

@@ -10,10 +10,10 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.instances import FIX
 from care_core.ecosystems.ardupilot.recorded import Recorded
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, runs
+from care_core.ecosystems.ardupilot.spans import Span, during, runs
 from care_core.ecosystems.vehicles import method_words, unrecorded_changes
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median
+from care_core.numbers import Bools, Floats, median
 
 READS: Wanted = {
     "ARM": ("ArmState", "Forced", "Method"),
@@ -172,7 +172,7 @@ class Armed(Recorded):
         """Whether it never armed though that was asked for."""
         return not self.armed and bool(self.refusals)
 
-    def drives_itself(self, t: Floats) -> Mask:
+    def drives_itself(self, t: Floats) -> Bools:
         """Which of these times lie in an armed span and a mode of a rover that drives without a pilot."""
         automatic = [mode.number for mode in self.modes if mode.number is not None and mode.way in _BY_ITSELF]
         return np.asarray(during(self.armed, t) & np.isin(self.modes_at(t), automatic))

@@ -17,10 +17,11 @@ from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M, FOLLOWED_DEG, Ai
 from care_core.ecosystems.ardupilot.battery import Battery
 from care_core.ecosystems.ardupilot.instances import FIX
 from care_core.ecosystems.ardupilot.one_run import OneRun, windows_of
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, runs
+from care_core.ecosystems.ardupilot.spans import Span, during, runs
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.liveness import Frozen
 from care_core.logs.base import Wanted, merge_needs
+from care_core.numbers import Bools, Floats
 
 READS: Wanted = merge_needs((
     recorded.READS,
@@ -45,7 +46,7 @@ _REFUSED_S = 30.0
 _ERR_BATTERY = 6
 
 
-def _lasting(t: Floats, held: Mask, least_s: float) -> tuple[Span, ...]:
+def _lasting(t: Floats, held: Bools, least_s: float) -> tuple[Span, ...]:
     """Spans of at least so many seconds in which something is so."""
     return tuple((a, b) for a, b in runs(t, held, gap_s=1.0) if b - a >= least_s)
 
@@ -121,7 +122,7 @@ class Flight(Airborne):
         lost = min((t for t in (self.lost_control_s, self.impact_s) if t is not None), default=math.inf)
         return tuple((start, min(end, lost)) for start, end in self.armed if start < lost)
 
-    def watch(self, t: Floats) -> Mask:
+    def watch(self, t: Floats) -> Bools:
         """Which of these times are watched."""
         return during(self.watched, t)
 

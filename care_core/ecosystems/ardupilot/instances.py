@@ -16,9 +16,7 @@ from care_core.ecosystems.ardupilot.messages import MESSAGES, former_fields, rec
 from care_core.ecosystems.dictionary import instance_field
 from care_core.ecosystems.liveness import says_nothing
 from care_core.logs.base import Kind, LazyColumns, Table
-from care_core.numbers import distinct
-
-Floats = NDArray[np.float64]
+from care_core.numbers import Bools, Floats, distinct
 
 _NO_FIX, FIX = 1.0, 3.0
 """GPS.Status of a receiver that is there and has no fix, and from which it has one in three dimensions."""
@@ -66,7 +64,7 @@ class _Today(LazyColumns):
     def kind(self, name: str) -> Kind:
         return self._table.kind(self._sources[name][0])
 
-    def where(self, mask: NDArray[np.bool_] | slice) -> _Today:
+    def where(self, mask: Bools | slice) -> _Today:
         return _Today(self._table.where(mask), self._sources)
 
 

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.logs.base import Table
-from care_core.numbers import pieces
+from care_core.numbers import Bools, Floats, pieces
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Span = tuple[float, float]
 """Start and end, in seconds from the start of the log."""
 
 
-def runs(t: Floats, mask: Mask, gap_s: float = 0.0) -> list[Span]:
+def runs(t: Floats, mask: Bools, gap_s: float = 0.0) -> list[Span]:
     """Spans in which a mask holds; those closer than `gap_s` are one."""
     if not mask.any():
         return []
@@ -30,7 +27,7 @@ def runs(t: Floats, mask: Mask, gap_s: float = 0.0) -> list[Span]:
     return spans
 
 
-def during(spans: Iterable[Span], t: Floats) -> Mask:
+def during(spans: Iterable[Span], t: Floats) -> Bools:
     """Which of these times lie within one of the spans."""
     inside = np.zeros(len(t), dtype=bool)
     for start, end in spans:

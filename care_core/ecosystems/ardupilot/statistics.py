@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, runs
+from care_core.ecosystems.ardupilot.spans import Span, runs
 from care_core.ecosystems.base import Limits
-from care_core.numbers import median, pieces, quantile
+from care_core.numbers import Bools, Floats, median, pieces, quantile
 
 Calibration = Sequence[tuple[float, float]]
 """Points (how many times over the limit, probability that the part really failed), rising."""
@@ -29,7 +29,7 @@ def calibrated_probability(over: float, points: Calibration) -> float:
     return float(np.interp(np.log(max(over, 1e-9)), np.log(ratios), shares))
 
 
-def lasting(t: Floats, mask: Mask, for_s: float, gap_s: float = 1.0, records: int = 3) -> list[Span]:
+def lasting(t: Floats, mask: Bools, for_s: float, gap_s: float = 1.0, records: int = 3) -> list[Span]:
     """Spans of at least `for_s` seconds and that many records in which a mask holds, but for gaps of `gap_s` or a
     record."""
     if not mask.any():

@@ -8,11 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.logs.base import Table, Wanted
-
-Floats = NDArray[np.float64]
+from care_core.numbers import Floats
 
 ATTITUDE, WANTED = "vehicle_attitude", "vehicle_attitude_setpoint"
 _Q, _Q_D = (tuple(f"{name}[{n}]" for n in range(4)) for name in ("q", "q_d"))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.findings import Finding, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.px4.flight import Px4Flight, Span
 from care_core.logs.base import Table
+from care_core.numbers import Bools, Floats
 from care_core.records import Record
 from care_core.text import times_until
 
@@ -64,7 +64,7 @@ class Episode(NamedTuple):
 
 
 def episode(
-    flight: Px4Flight, table: Table, bad: NDArray[np.bool_], state: State, source: str, at_least_s: float = 0.0
+    flight: Px4Flight, table: Table, bad: Bools, state: State, source: str, at_least_s: float = 0.0
 ) -> Episode | None:
     """A state that set in while armed and lasted long enough. One that holds from its first record on was there before:
     a vehicle flown by a ground station alone never had a radio to lose."""
@@ -86,7 +86,7 @@ def episode(
     return Episode(state, start, spans[-1][1], state.means + lasting, source, lasts_s)
 
 
-def _spans(t: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[Span]:
+def _spans(t: Floats, mask: Bools) -> list[Span]:
     """Spans in which a mask holds, each until the next row in which it does not."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     ends = np.minimum(edges[1::2], len(t) - 1)

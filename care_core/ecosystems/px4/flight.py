@@ -21,6 +21,7 @@ from care_core.ecosystems.px4 import sources
 from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED, Lean, lean_of
 from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
 from care_core.logs.base import Log, Table, Wanted
+from care_core.numbers import Bools, Floats
 
 Span = tuple[float, float]
 
@@ -194,7 +195,7 @@ class Px4Flight(RunModel):
         return table is None or bool(np.all(np.isin(table["vehicle_type"], (0, ROTARY))))
 
     @staticmethod
-    def spans(t: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[Span]:
+    def spans(t: Floats, mask: Bools) -> list[Span]:
         """From the first to the last time of each run of a mask."""
         edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
         return list(zip(t[edges[::2]].tolist(), t[edges[1::2] - 1].tolist(), strict=True))
@@ -329,6 +330,6 @@ def log_messages(flight: RunModel) -> Iterator[Event]:
         yield Event(t, _LEVELS.get(level.casefold(), "message"), text, MESSAGES)
 
 
-def _first_s(t: NDArray[Any], holds: NDArray[np.bool_]) -> float | None:
+def _first_s(t: NDArray[Any], holds: Bools) -> float | None:
     """The first time at which something holds; None where it never does."""
     return float(t[int(np.argmax(holds))]) if holds.any() else None

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.lost_motor import Commands
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.vehicles import Motor, motors_at, motors_of
 from care_core.ecosystems.vehicles.settings import Driven, code, number
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import Floats
 
 _MOST = 12
 _MOTORS, _OUTPUTS = "actuator_motors", "actuator_outputs"
@@ -81,7 +81,7 @@ def _range(least: float, most: float) -> tuple[float, float]:
 def _commands(table: Table, columns: list[str], low: float, high: float) -> Commands | None:
     if not set(columns) <= table.columns.keys():
         return None
-    share: NDArray[np.float64] = (np.array([table[column] for column in columns]) - low) / (high - low)
+    share: Floats = (np.array([table[column] for column in columns]) - low) / (high - low)
     known = np.isfinite(share).all(axis=0)
     if not known.any():
         return None

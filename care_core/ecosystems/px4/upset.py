@@ -6,12 +6,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Limits
 from care_core.ecosystems.px4 import attitude
 from care_core.ecosystems.px4.flight import LANDED, POSITION, ROTARY, STATUS, Px4Flight
 from care_core.logs.base import Wanted, merge_needs
+from care_core.numbers import Bools
 
 COMBINED = "sensor_combined"
 FORCES = tuple(f"accelerometer_m_s2[{n}]" for n in range(3))
@@ -184,6 +184,6 @@ def is_aloft(flight: Px4Flight, at: float) -> bool:
 def _stays(flight: Px4Flight, lean: attitude.Lean, since: float, hit_s: float) -> bool:
     """Whether it was not back within limits after a time, while armed and before it hit the ground."""
     until = min(next((end for start, end in flight.armed if start <= since <= end), since), hit_s)
-    held: NDArray[np.bool_] = (lean.error_deg < _HELD_DEG) & (lean.t > since) & (lean.t <= until)
+    held: Bools = (lean.error_deg < _HELD_DEG) & (lean.t > since) & (lean.t <= until)
     enough_s = _BACK_S if hit_s == math.inf else _CAUGHT_S
     return not any(end - start > enough_s for start, end in flight.spans(lean.t, held))

@@ -15,12 +15,12 @@ import numpy as np
 from care_core.ecosystems.ardupilot.airborne import ACRO, UPSIDE_DOWN_DEG
 from care_core.ecosystems.ardupilot.checks.thrust import saturated
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts
+from care_core.ecosystems.ardupilot.spans import Span, during, parts
 from care_core.ecosystems.ardupilot.statistics import lasting, means, records, top
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median
+from care_core.numbers import Bools, Floats, median
 
 READS: Wanted = {
     "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
@@ -390,7 +390,7 @@ def _steering(flight: Flight) -> Iterator[Finding]:
 
 
 def _unasked(
-    flight: Flight, table: Table, rate: str, wanted: str, where: Mask, limit: tuple[str, float]
+    flight: Flight, table: Table, rate: str, wanted: str, where: Bools, limit: tuple[str, float]
 ) -> tuple[list[Span], float]:
     """Where a rate swings far more than is asked for, and how far it is off its demand at most.
 
@@ -419,7 +419,7 @@ def _unasked(
     return spans, top(np.concatenate(list(level()))[swung], 0.9)
 
 
-def _exhausted(table: Table, n: int, output: str, most: float) -> Mask:
+def _exhausted(table: Table, n: int, output: str, most: float) -> Bools:
     """Where the controller asks for more than the vehicle can give: then the demand swings with it."""
     if output not in table.columns:
         return np.zeros(len(table), dtype=bool)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, parts
+from care_core.ecosystems.ardupilot.spans import parts
 from care_core.ecosystems.ardupilot.statistics import (
     aligned,
     calibrated,
@@ -27,7 +27,7 @@ from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median, quantile
+from care_core.numbers import Bools, Floats, median, quantile
 
 READS: Wanted = {
     "POS": ("Lat", "Lng"),
@@ -163,7 +163,7 @@ def _first(flight: Flight, *places: tuple[str, str]) -> tuple[Table, str] | None
     return next(((table, field) for table, field in told if table is not None), None)
 
 
-def _where_it_began(flight: Flight, t: Floats) -> Mask:
+def _where_it_began(flight: Flight, t: Floats) -> Bools:
     """Which of these times are within some metres of the first position; all where the log holds none."""
     track = flight.one("POS", "Lat", "Lng")
     if track is None:

@@ -15,12 +15,12 @@ from care_core.ecosystems.ardupilot import sources
 from care_core.ecosystems.ardupilot.battery import Battery, within_reason
 from care_core.ecosystems.ardupilot.checks.settings import supply
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
+from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import BATTERY_FAILSAFE, NO_BATTERY, OWN_SUPPLY, SAGS, UNCHARGED, Finding, Severity
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import known_median, median
+from care_core.numbers import Bools, Floats, known_median, median
 from care_core.text import log_time
 
 READS: Wanted = {"BAT": ("Volt", "Curr"), "POWR": ("Vcc",)}
@@ -206,7 +206,7 @@ def _board(flight: Flight) -> Iterator[Finding]:
     if table is None:
         return
     volts: Floats = np.where(table["Vcc"] > 100, table["Vcc"] / 1000, table["Vcc"])
-    weak: Mask = (volts > _BOARD_LEAST_V) & (volts < _BOARD_V) & flight.watch(table.t)
+    weak: Bools = (volts > _BOARD_LEAST_V) & (volts < _BOARD_V) & flight.watch(table.t)
     if weak.sum() < 2:
         return
     at, least, usual = table.t[weak], float(volts[weak].min()), float(median(volts[flight.watch(table.t)]))

@@ -16,7 +16,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.checks.refused_by import refusing
 from care_core.ecosystems.ardupilot.checks.settings import heading
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
+from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import (
     aligned,
     calibrated,
@@ -29,7 +29,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.liveness import says_nothing
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import known_median, median, quantile
+from care_core.numbers import Bools, Floats, known_median, median, quantile
 
 AXES = ("MagX", "MagY", "MagZ")
 READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "PARM": ("Name", "Value")}
@@ -127,7 +127,7 @@ def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     )
 
 
-def _silent(compass: Table) -> Mask:
+def _silent(compass: Table) -> Bools:
     silent = ~(length(compass[axis] for axis in AXES) > _NOTHING)
     return silent | (compass["Health"] == 0) if "Health" in compass.columns else silent
 
@@ -238,7 +238,7 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     first = compasses[0]
     strength = length(first[axis] for axis in AXES)
     throttle = np.interp(first.t, *driven)
-    usable: Mask = np.isfinite(strength) & (strength > 1.0)
+    usable: Bools = np.isfinite(strength) & (strength > 1.0)
     if usable.sum() < 20 or np.ptp(throttle[usable]) < _SPREAD:
         return
     x, y = throttle[usable], strength[usable]

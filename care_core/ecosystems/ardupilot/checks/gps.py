@@ -13,14 +13,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
+from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import quantile
+from care_core.numbers import Bools, Floats, quantile
 
 READS: Wanted = {
     "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Spd", "GCrs", "GMS"),
@@ -131,7 +131,7 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     )
 
 
-def _is_late(table: Table) -> Mask:
+def _is_late(table: Table) -> Bools:
     """Records that the receiver's own clock puts before earlier ones: two programs that write one file, or a second
     vehicle under the same name, mix them in. A new week begins once."""
     if "GMS" not in table.columns or not len(table):

@@ -12,12 +12,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Span, during
+from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median, quantile
+from care_core.numbers import Floats, median, quantile
 
 _AXES = ("AccX", "AccY", "AccZ")
 READS: Wanted = {"IMU": _AXES, "GPS": ("Alt", "Status")}

@@ -15,7 +15,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.checks.settings import level
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
+from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import (
     aligned,
     calibrated,
@@ -29,7 +29,7 @@ from care_core.ecosystems.ardupilot.statistics import (
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median, quantile
+from care_core.numbers import Bools, Floats, median, quantile
 
 GYROS, ACCELEROMETERS = ("GyrX", "GyrY", "GyrZ"), ("AccX", "AccY", "AccZ")
 READS: Wanted = {
@@ -202,7 +202,7 @@ def _beginning(t: Floats, over: Floats, span: Span) -> float:
     return min([span[0], *before])
 
 
-def _shaken(flight: Flight, table: Table) -> Mask:
+def _shaken(flight: Flight, table: Table) -> Bools:
     """Where the vehicle turns to and fro so fast that two gyros cannot be compared record by record."""
     rates = length(np.abs(table[axis] - smooth(table.t, table[axis], 5.0)) for axis in GYROS)
     limit = _PLANE_SHAKEN_DPS if flight.is_winged else _SHAKEN_DPS

@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
+from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
+from care_core.numbers import Bools, Floats
 
 READS: Wanted = {
     "XKF3": ("IVN", "IVE", "IVD"), "ATT": ("Roll", "Pitch", "Yaw"), "RATE": ("R", "P", "Y"),
@@ -114,7 +115,7 @@ def _follows(flight: Flight, arm: Floats) -> Iterator[tuple[float, tuple[float, 
 
 
 def _alike(t: Floats, off: Floats, given: Floats) -> Iterator[tuple[float, tuple[float, float, float, float]]]:
-    turns: Mask = (np.abs(given) > _TURNS_MS) & np.isfinite(off)
+    turns: Bools = (np.abs(given) > _TURNS_MS) & np.isfinite(off)
     if turns.sum() < _RECORDS:
         return
     a, b = given[turns], off[turns]

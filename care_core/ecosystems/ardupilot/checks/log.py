@@ -7,11 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
-from care_core.numbers import median, pauses
+from care_core.numbers import Bools, Floats, median, pauses
 
 READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "POWR": ("Vcc",)}
 
@@ -95,7 +94,7 @@ def _holes(flight: Flight) -> Iterator[Finding]:
         )
 
 
-def _inside(flight: Flight, start: Floats, end: Floats) -> Mask:
+def _inside(flight: Flight, start: Floats, end: Floats) -> Bools:
     """Which steps lie within one span armed and clear of its ends: there loggers are opened and closed."""
     inside = np.zeros(len(start), dtype=bool)
     for begin, over in flight.armed:

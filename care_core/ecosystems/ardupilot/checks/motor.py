@@ -18,14 +18,14 @@ from care_core.ecosystems import lost_motor
 from care_core.ecosystems.ardupilot.checks import bench
 from care_core.ecosystems.ardupilot.checks.thrust import climbs, saturated
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
+from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, means, records
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.lost_motor import Commands, driven_hardest
 from care_core.ecosystems.vehicles import Motor, motors_of
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median, pieces, quantile
+from care_core.numbers import Bools, Floats, median, pieces, quantile
 from care_core.records import Record
 
 READS: Wanted = {
@@ -119,7 +119,7 @@ class _Outputs(Record, eq=False):
     def t(self) -> Floats:
         return self.table.t
 
-    def share(self, rows: Mask | slice) -> NDArray[np.float64]:
+    def share(self, rows: Bools | slice) -> Floats:
         """What was asked in these rows, shape (motors, n): 0 idle, 1 the most it may give."""
         part = self.table.where(rows)
         share = np.array([part[_column(motor)] for motor in self.motors])
@@ -180,7 +180,7 @@ def _range(flight: Flight, seen: float) -> tuple[float, float]:
     return low, min(top, max(seen, low + 0.6 * (high - low)))
 
 
-def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
+def _lifting(flight: Flight, outputs: _Outputs) -> Bools:
     """Rows in which the motors lift it, upright, and nothing else holds it: in the air, or where it never left the
     ground the first seconds of trying, before the integrators wind up. What climbs with all its throttle lacks no
     thrust, and its mixer takes from some motors what the attitude wants of the others."""
@@ -200,7 +200,7 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
     return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting
 
 
-def _hovers(flight: Flight, t: Floats) -> Mask:
+def _hovers(flight: Flight, t: Floats) -> Bools:
     """When a vehicle is carried by its motors alone: a copter until it flies so fast that the air bears unevenly on
     its propellers."""
     moved = flight.one("GPS", "Spd")
@@ -209,7 +209,7 @@ def _hovers(flight: Flight, t: Floats) -> Mask:
     return np.asarray(np.interp(t, moved.t, moved["Spd"]) < (_FAST_MS if flight.is_copter else _HOVERS_MS))
 
 
-def _excess(outputs: _Outputs, where: Mask) -> Iterator[NDArray[np.float64]]:
+def _excess(outputs: _Outputs, where: Bools) -> Iterator[Floats]:
     """How far each motor stands above the middle of the others in the rows of a mask, piece by piece of them, shape
     (motors, n)."""
     everyone = np.arange(len(outputs.motors))
@@ -218,7 +218,7 @@ def _excess(outputs: _Outputs, where: Mask) -> Iterator[NDArray[np.float64]]:
         yield np.array([share[n] - median(share[everyone != n], axis=0) for n in everyone])
 
 
-def _smooth_excess(outputs: _Outputs, where: Mask, window: int) -> Iterator[NDArray[np.float64]]:
+def _smooth_excess(outputs: _Outputs, where: Bools, window: int) -> Iterator[Floats]:
     """The same as means over a window, which does not lie across a flight on wings or a pause of the record."""
     rows = np.flatnonzero(where)
     for unbroken in np.split(rows, np.flatnonzero(np.diff(outputs.t[rows]) > _WINDOW_S) + 1):

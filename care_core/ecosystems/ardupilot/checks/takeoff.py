@@ -14,12 +14,12 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.airborne import ACRO
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Mask, Span, during, runs
+from care_core.ecosystems.ardupilot.spans import Span, during, runs
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.vehicles import motor_outputs
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median
+from care_core.numbers import Bools, median
 
 READS: Wanted = {
     "RATE": ("R", "RDes", "ROut", "P", "PDes", "POut", "Y", "YDes", "YOut"),
@@ -155,7 +155,7 @@ def _away(flight: Flight, first: Table, axis: str, rate: str) -> Iterator[Runawa
     step = float(median(np.diff(first.t)))
     off, output = first[rate] - first[f"{rate}Des"], first[f"{rate}Out"]
     limit = _YAW_AWAY_DPS if rate == "Y" else _AWAY_DPS
-    against: Mask = (np.abs(off) > limit) & (np.sign(off) == -np.sign(output)) & (np.abs(output) > _PUSHES)
+    against: Bools = (np.abs(off) > limit) & (np.sign(off) == -np.sign(output)) & (np.abs(output) > _PUSHES)
     against &= ~np.isin(flight.modes_at(first.t), tuple(ACRO))
     if rate == "Y":
         spans = [

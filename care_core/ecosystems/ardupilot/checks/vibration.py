@@ -13,7 +13,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
+from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import (
     calibrated,
     calibrated_probability,
@@ -27,7 +27,7 @@ from care_core.ecosystems.ardupilot.statistics import (
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import quantile
+from care_core.numbers import Bools, Floats, quantile
 
 READS: Wanted = {
     "VIBE": ("VibeX", "VibeY", "VibeZ", "Clip"),
@@ -122,7 +122,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
     )
 
 
-def _scrapes(flight: Flight, t: Floats) -> Mask:
+def _scrapes(flight: Flight, t: Floats) -> Bools:
     """When a copter leans so far, so low, that an arm of it is on the ground: that shakes it, and is no vibration."""
     if not flight.is_copter or flight.tilt is None or flight.height is None:
         return np.zeros(len(t), dtype=bool)

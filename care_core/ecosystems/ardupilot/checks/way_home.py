@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, runs
+from care_core.ecosystems.ardupilot.spans import Span, runs
 from care_core.ecosystems.ardupilot.statistics import smooth
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
-from care_core.numbers import quantile
+from care_core.numbers import Bools, Floats, quantile
 
 READS: Wanted = {"POS": ("Lat", "Lng", "RelHomeAlt")}
 
@@ -256,7 +256,7 @@ def _descent(flight: Flight, way: _Way) -> Iterator[_Slow]:
 
 def _sunk(way: _Way, speed_cms: float, bottom_cm: float, top_cm: float) -> tuple[Span | None, float]:
     """Where it came down at about this speed between two heights, and how many metres."""
-    sinks: Mask = np.abs(100 * way.sinks_ms - speed_cms) < _LIKE * speed_cms
+    sinks: Bools = np.abs(100 * way.sinks_ms - speed_cms) < _LIKE * speed_cms
     within = (100 * way.height_m > bottom_cm) & (100 * way.height_m < top_cm) & sinks
     if not within.any():
         return None, 0.0

@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot import armed, recorded
 from care_core.ecosystems.ardupilot.held_missions import CURVES, LAND, PLACES, RETURN, SPLINE, HeldMission, Item
@@ -40,7 +39,7 @@ from care_core.ecosystems.vehicles.way import (
     phases_home,
 )
 from care_core.logs.base import Wanted, merge_needs
-from care_core.numbers import known_median
+from care_core.numbers import Bools, Floats, known_median
 from care_core.records import Record
 from care_core.run import Unavailable
 
@@ -69,8 +68,6 @@ _COMPLETE = ("Mission Complete", "Mission complete")
 SAID_AFTER_S = 0.6
 """What ends a mission may be said a moment after it: a crash disarms first, and telemetry knows a disarming to half a
 second (its heartbeats)."""
-
-Floats = NDArray[np.float64]
 
 
 class Waypoint(NamedTuple):
@@ -109,7 +106,7 @@ class FlownMission(Record, eq=False):
     curved: tuple[Phase, ...] = ()
     """Where it was on a spline, or on a circle and the leg from its edge: no straight leg says where it should be."""
 
-    def under_way(self, t: Floats) -> NDArray[np.bool_]:
+    def under_way(self, t: Floats) -> Bools:
         """Whether the vehicle was on its way at times `t`: in its mission, or, where it flies, above `AIRBORNE_M`."""
         if self.drive is not None:
             return np.asarray((t >= self.drive.start_s) & (t <= self.drive.end_s))

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.measures.events import (
     CUT,
@@ -30,9 +29,8 @@ from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
 from care_core.ecosystems.vehicles.way import AIRBORNE_M
 from care_core.logs.base import Wanted
+from care_core.numbers import Floats
 from care_core.run import Check, Unavailable, Value, is_known
-
-Floats = NDArray[np.float64]
 
 _TOOK_OFF, _LANDED = (16, 28), (18,)
 """EV records of the land detector."""

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import takewhile
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot import held_missions
 from care_core.ecosystems.ardupilot.flight import Flight
@@ -39,8 +38,6 @@ from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
 from care_core.run import Unavailable, Value
 from care_core.text import log_time
-
-Floats = NDArray[np.float64]
 
 ITEMS: Wanted = {
     **held_missions.READS,

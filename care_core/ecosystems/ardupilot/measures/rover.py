@@ -6,7 +6,6 @@ Missions, phases, path and energy are those of `flight` and `ardupilot`.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
@@ -16,10 +15,8 @@ from care_core.ecosystems.coverage import SUM, USUAL
 from care_core.ecosystems.measures import Args, Mission, extractor, one_of
 from care_core.ecosystems.vehicles import is_skid_steered
 from care_core.logs.base import Table, Wanted, merge_needs
-from care_core.numbers import median, quantile
+from care_core.numbers import Floats, median, quantile
 from care_core.run import Unavailable, Value
-
-Floats = NDArray[np.float64]
 
 _SPEED: Wanted = {"THR": ("ThrOut", "DesSpeed", "Speed")}
 _STEERING: Wanted = {"STER": ("SteerOut", "LatAcc", "DesTurnRate", "TurnRate")}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures import rests
@@ -14,9 +13,8 @@ from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mis
 from care_core.ecosystems.measures import Args, Mission, extractor, missing
 from care_core.ecosystems.statistic import STATISTIC, statistic
 from care_core.logs.base import Table, Wanted, merge_needs
+from care_core.numbers import Floats
 from care_core.run import Unavailable, Value
-
-Floats = NDArray[np.float64]
 
 MIN_ROWS = 5
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
@@ -16,9 +15,8 @@ from care_core.ecosystems.measures import Args, Mission, extractor, one_of
 from care_core.ecosystems.statistic import statistic
 from care_core.ecosystems.vehicles import motor_outputs
 from care_core.logs.base import Table, Wanted, merge_needs
+from care_core.numbers import Floats
 from care_core.run import Unavailable, Value
-
-Floats = NDArray[np.float64]
 
 
 def _wrapped(degrees: Floats) -> Floats:

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.held_missions import (
     CIRCLES,
@@ -42,11 +41,9 @@ from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, mis
 from care_core.ecosystems.statistic import statistic
 from care_core.ecosystems.vehicles.way import distance_to_legs
 from care_core.logs.base import Table, Wanted, merge_needs
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 from care_core.records import Record
 from care_core.run import Unavailable, Value
-
-Floats = NDArray[np.float64]
 
 _STAT = one_of("mean, max, min, rms or peak (95th percentile)", "mean", "max", "min", "rms", "peak")
 _FULL_DEFLECTION, _AT_LIMIT = 4500.0, 0.95

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Check
 from care_core.ecosystems.findings import IDLED, STEERED, Finding
@@ -13,7 +12,7 @@ from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.px4.upset import LEFT_DEG, LIMITS
 from care_core.logs.base import Wanted, merge_needs
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 
 _STICKS = "manual_control_setpoint"
 READS: Wanted = merge_needs((upset.READS, {_STICKS: ("z", "throttle")}))
@@ -68,7 +67,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         )
 
 
-def _thrust_stick(flight: Px4Flight, span: tuple[float, float]) -> NDArray[np.float64]:
+def _thrust_stick(flight: Px4Flight, span: tuple[float, float]) -> Floats:
     """Where the stick was that is the thrust itself, 0 to 1; nothing where another mode was in force."""
     if _BY_THROTTLE.issuperset(flight.modes_during(span)):
         for field, bottom, way in (("z", 0.0, 1.0), ("throttle", -1.0, 2.0)):  # before 1.14, and since
@@ -78,7 +77,7 @@ def _thrust_stick(flight: Px4Flight, span: tuple[float, float]) -> NDArray[np.fl
     return np.empty(0)
 
 
-def _is_down(stick: NDArray[np.float64]) -> bool:
+def _is_down(stick: Floats) -> bool:
     return len(stick) > 0 and float(median(stick)) < _STICK_LOW
 
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, during
-from care_core.numbers import median
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.numbers import Floats, median
 
 _G = 9.81
 _OVER_S, _LATE_S, _FEWEST, _HOLE_S = 1.0, 0.2, 30, 3.0

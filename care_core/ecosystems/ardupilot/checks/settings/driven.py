@@ -11,12 +11,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Mask, Span, during
+from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table, Wanted
 from care_core.metadata.ardupilot import firmware_default
+from care_core.numbers import Bools
 
 READS: Wanted = {"THR": ("ThrOut", "DesSpeed", "Speed"), "STER": ("SteerOut", "TurnRate")}
 
@@ -147,7 +148,7 @@ def _told(flight: Flight, name: str, wanted: float | None, span: Span, title: st
     )
 
 
-def _in_mission(flight: Flight, driven: Table) -> Mask:
+def _in_mission(flight: Flight, driven: Table) -> Bools:
     return np.asarray(flight.drives_itself(driven.t) & (flight.modes_at(driven.t) == _AUTO))
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats
 from care_core.ecosystems.base import Limits
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 
 AXES = ("AccX", "AccY", "AccZ")
 READS: Wanted = {"IMU": AXES}

@@ -17,12 +17,11 @@ from care_core.ecosystems.ardupilot.checks.settings import gravity
 from care_core.ecosystems.ardupilot.checks.settings.course import Course, Leans
 from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats
 from care_core.ecosystems.ardupilot.statistics import aligned, length
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 from care_core.records import Record
 
 _FIELD = ("MagX", "MagY", "MagZ")

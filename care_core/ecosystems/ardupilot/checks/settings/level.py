@@ -14,11 +14,10 @@ import numpy as np
 from care_core.ecosystems.ardupilot.checks.settings import gravity, heading
 from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.logs.base import Wanted, merge_needs
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 from care_core.records import Record
 
 READS: Wanted = merge_needs((gravity.READS, {"ATT": ("Roll", "Pitch")}))

@@ -13,12 +13,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Mask
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Wanted
 from care_core.metadata.ardupilot import firmware_default
-from care_core.numbers import Floats
+from care_core.numbers import Bools, Floats
 from care_core.records import Record
 from care_core.run import shown
 
@@ -242,7 +241,7 @@ def _ends(flight: Flight, drive: _Drive) -> Iterator[Finding]:
                 continue
             if abs(value - trim) >= _NARROW * abs(default - trim):
                 continue
-            at_end: Mask = np.abs(drive.outputs[output] - value) <= _AT_END_US
+            at_end: Bools = np.abs(drive.outputs[output] - value) <= _AT_END_US
             share = float(np.mean(at_end & lacks))
             if share >= _LACKS_FOR:
                 yield _end_finding(drive, name, value, default, share)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.spans import Floats
+from care_core.numbers import Floats
 
 _EULER: Mapping[int, tuple[float, float, float]] = {
     **{n: (0, 0, 45 * n) for n in range(8)},

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
+from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import smooth
 from care_core.ecosystems.base import Limits
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median
+from care_core.numbers import Bools, Floats, median
 
 READS: Wanted = {"ATT": ("Roll", "Yaw"), "GPS": ("Spd",)}
 LIMITS = Limits()
@@ -36,7 +36,7 @@ def held_at(t: Floats, table: Table, field: str) -> float:
     return float(median(np.interp(t, table.t, table[field])))
 
 
-def _goes_straight(leans: Table) -> Mask:
+def _goes_straight(leans: Table) -> Bools:
     with np.errstate(divide="ignore", invalid="ignore"):  # damage gives records one time
         rate = np.degrees(np.gradient(np.unwrap(np.radians(leans["Yaw"])), leans.t))
     return np.asarray(np.abs(smooth(leans.t, np.where(np.isfinite(rate), rate, _NO_RATE_DPS), _OVER_S)) < _STRAIGHT_DPS)
