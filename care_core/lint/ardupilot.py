@@ -11,7 +11,6 @@ from typing import TypeVar
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.lint.documented import meant_instead, not_listed, share_known, unknown_bits
-from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import ardupilot
 from care_core.metadata.aliases import aliases_of
@@ -110,9 +109,9 @@ def _unknown(file: ConfigFile, entry: Entry) -> Problem:
     meant = "" if is_older else meant_instead(entry.name, {one.name for one in file.entries}, ardupilot.names())
     if meant:
         text = f"No release of ArduPilot from 3.4 on has a parameter {entry.name}."
-        return problem_at("unknown-key", Severity.WARNING, file, entry, text, f"Did you mean {meant}?", _LISTS)
+        return file.warning("unknown-key", entry, text, f"Did you mean {meant}?", _LISTS)
     text = f"ArduPilot's lists have no parameter {entry.name}: a script's, a custom build's, or one before 3.4."
-    return problem_at("unknown-key", Severity.NOTE, file, entry, text, "Check its spelling.", _LISTS)
+    return file.note("unknown-key", entry, text, "Check its spelling.", _LISTS)
 
 
 def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[Release], is_told: bool) -> Problem:
@@ -123,9 +122,9 @@ def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[Release], is_t
     told = _told(releases) if is_told else f"the releases that know most of this file ({_told(releases)})"
     known = _told([one for one in ardupilot.ALL if one in ardupilot.known_in(entry.name)])
     if new:
-        return problem_at("renamed", severity, file, entry, f"{entry.name} is {new[0]} in {told}.", new[1], _LISTS)
+        return file.problem("renamed", severity, entry, f"{entry.name} is {new[0]} in {told}.", new[1], _LISTS)
     text = f"{entry.name} is not in {told}, but in {known}."
-    return problem_at("unknown-key", severity, file, entry, text, "Is the file for this firmware?", _LISTS)
+    return file.problem("unknown-key", severity, entry, text, "Is the file for this firmware?", _LISTS)
 
 
 def _renamed(name: str, releases: Sequence[Release]) -> tuple[str, str] | None:
@@ -195,9 +194,9 @@ def _outside(file: ConfigFile, entry: Entry, value: float, facts: Sequence[Fact]
         fits = [scaled for scaled in (value / ratio, value * ratio) if low < scaled < high]
         if low >= 0 and value > 0 and fits and not low / _FAR <= value <= high * _FAR:
             hint = f"Is it in {words}? {fits[0]:g} would be within the range."
-            yield problem_at("wrong-unit", Severity.WARNING, file, entry, text, hint, fact.source)
+            yield file.warning("wrong-unit", entry, text, hint, fact.source)
             return
-    yield problem_at("out-of-range", Severity.NOTE, file, entry, text, "The range is what is usual.", fact.source)
+    yield file.note("out-of-range", entry, text, "The range is what is usual.", fact.source)
 
 
 def _is_default(name: str, value: float) -> bool:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from care_core.errors import nearest
-from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.readers import OBSTACLES, readers
 from care_core.lint.scopes import Scoped
@@ -88,4 +87,4 @@ def _refused(file: ConfigFile, entry: Entry, choice: Choice) -> Problem:
     text = f"{entry.keys[-1]} is {entry.value}, which is none of its values: {choice.why}."
     hint = f"They are {', '.join(choice.words)}."
     meant = nearest(str(entry.value), choice.words)
-    return problem_at("not-in-values", choice.severity, file, entry, text, f"{hint} {meant}".strip(), choice.source)
+    return file.problem("not-in-values", choice.severity, entry, text, f"{hint} {meant}".strip(), choice.source)

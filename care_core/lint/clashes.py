@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import NamedTuple
 
-from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata.refusals import RELATIONS
 
@@ -208,9 +207,9 @@ def check(file: ConfigFile, values: Mapping[str, Entry], clashes: Sequence[Clash
             clauses = _clauses(clash.when, number)
             if all(_holds(clause, values) for clause in clauses):
                 first, *others = dict.fromkeys(side for left, _, right in clauses for side in (left, right))
-                held = tuple(name for name in others if name in values)
+                held = [values[name] for name in others if name in values]
                 text, hint = (_filled(text, number, values) for text in (clash.text, clash.hint))
-                yield problem_at(clash.rule, clash.severity, file, values[first], text, hint, clash.source, held)
+                yield file.problem(clash.rule, clash.severity, values[first], text, hint, clash.source, held)
 
 
 @cache

@@ -7,8 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import ConfigFile, Entry, Problem
 
 
 class Pair(NamedTuple):
@@ -94,7 +93,7 @@ def pairs(file: ConfigFile, values: Mapping[str, Entry], known: Sequence[Pair]) 
             why = f": {pair.why}" if pair.why else ""
             text = f"{low.keys[-1]} ({low.number:g}) is above {high.keys[-1]} ({high.number:g}){why}."
             hint = f"The other is in line {high.line}." if high.line else ""
-            yield problem_at("contradiction", Severity.WARNING, file, low, text, hint, pair.source, (high.name,))
+            yield file.warning("contradiction", low, text, hint, pair.source, [high])
 
 
 def inscribed_radius(footprint: Entry | None, radius: Entry | None) -> float | None:
@@ -136,4 +135,4 @@ def inflation(file: ConfigFile, radius: float | None, inflations: Sequence[Entry
         if radius is not None and entry.number is not None and 0 < entry.number < radius * (1 - 1e-6):
             text = f"inflation_radius ({entry.number:g} m) is smaller than the robot ({radius:.3g} m from its centre)."
             hint = "Plans may touch obstacles: give it at least the robot's inscribed radius."
-            yield problem_at("contradiction", Severity.WARNING, file, entry, text, hint, _INFLATION)
+            yield file.warning("contradiction", entry, text, hint, _INFLATION)

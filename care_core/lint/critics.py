@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.errors import nearest
-from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Problem, Severity
 from care_core.lint.readers import Reader, Readers
 from care_core.lint.scopes import class_of, words_of
@@ -29,7 +28,7 @@ def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             continue
         text = "No critic of DWBLocalPlanner looks at the path or the goal: nothing draws the robot along."
         hint = "Add PathAlign, PathDist, GoalAlign and GoalDist to the list."
-        yield problem_at("cannot-work", Severity.WARNING, file, entry, text, hint, "dwb_critics, map_grid.cpp")
+        yield file.warning("cannot-work", entry, text, hint, "dwb_critics, map_grid.cpp")
 
 
 def _classes(reader: Reader) -> dict[str, str]:
@@ -52,7 +51,7 @@ def _misspelled(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             if f"{name}.class" in reader.values or kind in _CRITICS or not meant:
                 continue
             text = f"critics names {name}, and dwb_critics has no such critic: controller_server will not start."
-            yield problem_at("plugin-name", Severity.ERROR, file, entry, text, meant, "dwb_local_planner.cpp")
+            yield file.error("plugin-name", entry, text, meant, "dwb_local_planner.cpp")
 
 
 def _looks_elsewhere(reader: Reader) -> bool:
@@ -71,7 +70,7 @@ def _turning(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         text = f"min_speed_theta ({least:g}) is above max_vel_theta ({most:g}): {what}."
         hint = f"The other is in line {top.line}." if top.line else ""
         severity = Severity.WARNING if is_asked else Severity.NOTE
-        yield problem_at("contradiction", severity, file, entry, text, hint, _SPEEDS, (top.name,))
+        yield file.problem("contradiction", severity, entry, text, hint, _SPEEDS, [top])
 
 
 RULES = (_drawn, _misspelled, _turning)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from care_core.lint.generic import near, problem_at
-from care_core.lint.problems import ConfigFile, Problem, Severity
-from care_core.lint.readers import Readers, numbers, warning
+from care_core.lint.generic import near
+from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.readers import Readers, numbers
 from care_core.lint.scopes import words_of
 
 _UTILS = "utils.hpp of opennav_docking, parseDockParams"
@@ -23,11 +23,11 @@ def _docks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 text = f"{dock.name()} is of type {kind.value}, which dock_plugins does not name: no robot docks there."
                 meant = near(str(kind.value), kinds)
                 hint = f"Did you mean {meant}?" if meant else f"They are {', '.join(kinds)}."
-                yield warning("cannot-work", file, kind, text, hint, _DATABASE)
+                yield file.warning("cannot-work", kind, text, hint, _DATABASE)
             if pose is not None and pose.kind == "list" and (own := numbers(pose)) and len(own) != _POSE:
                 text = f"pose of {dock.name()} has {len(own)} numbers: the docking server does not start."
                 hint = "Write x, y and the angle."
-                yield problem_at("cannot-work", Severity.ERROR, file, pose, text, hint, _UTILS)
+                yield file.error("cannot-work", pose, text, hint, _UTILS)
 
 
 RULES = (_docks,)

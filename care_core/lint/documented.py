@@ -6,8 +6,7 @@ import re
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.metadata.fact import Fact
 
 _ALIKE = 0.84
@@ -33,7 +32,7 @@ def not_listed(file: ConfigFile, entry: Entry, value: float, fact: Fact) -> Prob
     codes = [f"{code:g}" for code, _ in fact.values]
     text = f"{entry.name} is {value:g}, which is none of the values of {fact.source}."
     hint = f"They are {', '.join(codes[:12])}{', ...' if len(codes) > 12 else ''}."
-    return problem_at("not-in-values", Severity.WARNING, file, entry, text, hint, fact.source)
+    return file.warning("not-in-values", entry, text, hint, fact.source)
 
 
 def unknown_bits(file: ConfigFile, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Problem]:
@@ -44,4 +43,4 @@ def unknown_bits(file: ConfigFile, entry: Entry, value: float, facts: Sequence[F
     if unknown:
         source = facts[-1].source
         text = f"{entry.name} is {value:g}: bit {', '.join(map(str, unknown))} means nothing to {source}."
-        yield problem_at("not-in-values", Severity.NOTE, file, entry, text, "", source)
+        yield file.note("not-in-values", entry, text, "", source)

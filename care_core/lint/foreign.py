@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from care_core.lint.generic import problem_at
 from care_core.lint.lists import Raised
-from care_core.lint.problems import ConfigFile, Problem, Severity
+from care_core.lint.problems import ConfigFile, Problem
 from care_core.lint.scopes import Keys, Place, Scoped
 from care_core.metadata import navigation
 from care_core.metadata.navigation import STACKS
@@ -50,5 +49,5 @@ def _problem(file: ConfigFile, result: Scoped, owners: Keys, other: str, places:
     first, *more = places
     text = f"{first.name} and {len(more)} more are parameters of {other}: {owners[0]} does not read them."
     hint = f"Leave them out, or load {other} and write them below its name."
-    others = tuple(one.entry.name for one in more)
-    return problem_at("misplaced-key", Severity.WARNING, file, first.entry, text, hint, STACKS[result.ros], others)
+    others = [one.entry for one in more]
+    return file.warning("misplaced-key", first.entry, text, hint, STACKS[result.ros], others)

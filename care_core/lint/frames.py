@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 
 from care_core.lint.problems import ConfigFile, Entry, Problem
-from care_core.lint.readers import Readers, warning
+from care_core.lint.readers import Readers
 from care_core.lint.scopes import COSTMAP
 
 _ABOVE = re.compile(r"base_(link|footprint)$")
@@ -33,7 +33,7 @@ def _bases(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     for name, entry in odd[:1]:
         text = f"{entry.keys[-1]} of {name} is {_frame(entry)}, and of the others {most}: one robot has one frame."
         source = "each node asks tf where this frame is on its map"
-        yield warning("contradiction", file, entry, text, "Give all the same.", source, others[:1])
+        yield file.warning("contradiction", entry, text, "Give all the same.", source, others[:1])
 
 
 def _moving(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -44,7 +44,7 @@ def _moving(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if entry is not None and _frame(entry) in own:
             text = f"global_frame is {_frame(entry)}, the robot's own: what was seen moves along with it."
             hint = "Give it odom or map."
-            yield warning("hinders", file, entry, text, hint, "costmap_2d_ros.cpp keeps obstacles in that frame")
+            yield file.warning("hinders", entry, text, hint, "costmap_2d_ros.cpp keeps obstacles in that frame")
 
 
 def _frame(entry: Entry) -> str:
@@ -66,7 +66,7 @@ def _postdated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 "so much later."
             )
             source = "amcl_node.cpp dates map -> odom so far ahead, and tf interpolates between two dates"
-            yield warning("hinders", file, entry, text, "1 is usual: give it what the transforms lag.", source)
+            yield file.warning("hinders", entry, text, "1 is usual: give it what the transforms lag.", source)
 
 
 RULES = (_bases, _moving, _postdated)

@@ -9,26 +9,10 @@ from difflib import get_close_matches
 from care_core.configs.driven import same_value
 from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.rules import BY_ID
 from care_core.run import shown
 
 _ALIKE = 0.8
 """Least likeness of a name to the one that is meant, of difflib."""
-
-
-def problem_at(
-    rule: str,
-    severity: Severity,
-    file: ConfigFile,
-    entry: Entry,
-    text: str,
-    hint: str = "",
-    source: str = "",
-    others: tuple[str, ...] = (),
-) -> Problem:
-    """A problem at an entry; `source` where it is not the rule's own."""
-    where = (file.path, entry.line, entry.column, entry.name)
-    return Problem(rule, severity, *where, text, hint, source or BY_ID[rule].source, others)
 
 
 def near(name: str, known: Iterable[str]) -> str:
@@ -55,17 +39,16 @@ def check(file: ConfigFile) -> Iterator[Problem]:
         is_yaml = file.format.is_yaml
         if number is not None and math.isnan(number) and not is_yaml:
             text = f"{entry.name} is not a number."
-            yield problem_at("wrong-type", Severity.ERROR, file, entry, text, "Give it one.")
+            yield file.error("wrong-type", entry, text, "Give it one.")
 
 
 def _twice(file: ConfigFile, earlier: Entry, entry: Entry) -> Problem:
     same = same_value(earlier.value, entry.value)
     counts = "QGroundControl counts the first" if file.format is QGC_PARAMS else "this one counts"
     said = "with the same value" if same else f"there {shown(earlier.value)}, here {shown(entry.value)}: {counts}"
-    return problem_at(
+    return file.problem(
         "duplicate",
         Severity.NOTE if same else Severity.WARNING,
-        file,
         entry,
         f"{entry.name} is set in line {earlier.line} already, {said}.",
         "Keep one of the two.",

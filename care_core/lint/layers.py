@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.lint.problems import ConfigFile, Entry, Problem
-from care_core.lint.readers import INFLATIONS, MARKING, OBSTACLES, Reader, Readers, warning
+from care_core.lint.readers import INFLATIONS, MARKING, OBSTACLES, Reader, Readers
 from care_core.lint.scopes import COSTMAP, class_of, words_of
 
 _RANGES = {"obstacle_max_range": 2.5, "raytrace_max_range": 3.0}
@@ -25,13 +25,13 @@ def _marks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         marking = [one for one in layers if not one.is_off("enabled")]
         if layers and not marking and any("local_costmap" in key for key in costmap.scope):
             text = "No layer of the local costmap that marks obstacles is on: the robot drives blind."
-            yield warning("hinders", file, layers[0].values["enabled"], text, "Switch one on.", "obstacle_layer.cpp")
+            yield file.warning("hinders", layers[0].values["enabled"], text, "Switch one on.", "obstacle_layer.cpp")
         for name, what in (("marking", "puts obstacles into it"), ("clearing", "takes obstacles out of it")):
             switches = [entry for layer in marking for entry in layer.own(name)]
             if switches and all(entry.value == "false" for entry in switches):
                 text = f"No source of {costmap.name() or 'the costmap'} {what}."
                 hint = f"Switch {name} on for one."
-                yield warning("hinders", file, switches[0], text, hint, "obstacle_layer.cpp", switches[1:])
+                yield file.warning("hinders", switches[0], text, hint, "obstacle_layer.cpp", switches[1:])
     for reader in held.of(*OBSTACLES, COSTMAP):
         yield from _uncleared(file, reader)
 
@@ -55,7 +55,7 @@ def _uncleared(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
                 text = f"{far} ({far_m:g} m{said[0]}) is above {short} ({short_m:g} m{said[1]})."
                 hint = "What is marked beyond is never cleared."
                 others = [marked] if cleared is not None and marked is not None else []
-                yield warning("contradiction", file, entry, text, hint, "obstacle_layer.cpp", others)
+                yield file.warning("contradiction", entry, text, hint, "obstacle_layer.cpp", others)
 
 
 def _ordered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -82,7 +82,7 @@ def _overwritten(file: ConfigFile, costmap: Reader, entry: Entry, listed: Listed
         name = listed[maps[-1]][0]
         text = f"{name} comes after {marked[0]}: the map overwrites the obstacles."
         hint = f"Put {name} first, or switch use_maximum of the costmap on."
-        yield warning("hinders", file, entry, text, hint, "static_layer.cpp, updateCosts")
+        yield file.warning("hinders", entry, text, hint, "static_layer.cpp, updateCosts")
 
 
 def _not_inflated(file: ConfigFile, entry: Entry, listed: Listed) -> Iterator[Problem]:
@@ -98,7 +98,7 @@ def _not_inflated(file: ConfigFile, entry: Entry, listed: Listed) -> Iterator[Pr
             text = f"{name} comes after {last}: what it removes stays inflated."
         else:
             continue
-        yield warning("hinders", file, entry, text, f"Put {last} after {name}.", _ORDER)
+        yield file.warning("hinders", entry, text, f"Put {last} after {name}.", _ORDER)
 
 
 def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -115,7 +115,7 @@ def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         text += f"{missing[0]} has the defaults, which clear nothing."
         hint = f"Give both the same name: {missing[0]} or {spare[0]}."
         others = [one for key, one in reader.values.items() if key.startswith(f"{spare[0]}.")]
-        yield warning("contradiction", file, entry, text, hint, "obstacle_layer.cpp, onInitialize", others[:1])
+        yield file.warning("contradiction", entry, text, hint, "obstacle_layer.cpp, onInitialize", others[:1])
 
 
 def _beside(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -130,7 +130,7 @@ def _beside(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             name = deaf[0].scope[-1]
             text = f"observation_sources stands beside {name}, not in it: the layer hears no sensor."
             hint = f"Move it below {name}, and what it names as well."
-            yield warning("cannot-work", file, entry, text, hint, "obstacle_layer.cpp, onInitialize")
+            yield file.warning("cannot-work", entry, text, hint, "obstacle_layer.cpp, onInitialize")
 
 
 def _drifting(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -145,7 +145,7 @@ def _drifting(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 "global_frame is odom, and the map is drawn into it as it stands: as odometry drifts, it is elsewhere."
             )
             hint = "Set it to the frame of the map."
-            yield warning("hinders", file, frame, text, hint, "static_layer.cpp, updateCosts: not rolling")
+            yield file.warning("hinders", frame, text, hint, "static_layer.cpp, updateCosts: not rolling")
 
 
 def _holds_map(file: ConfigFile, held: Readers, costmap: Reader) -> bool:

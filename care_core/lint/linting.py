@@ -10,7 +10,7 @@ from care_core.configs.loading import split_name
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.errors import UsageError, nearest
 from care_core.lint import ardupilot, clashes, contradictions, generic, navigation, outputs, px4
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.lint.reading import read_file
 from care_core.metadata.navigation import DISTRIBUTIONS
 from care_core.records import Record
@@ -110,7 +110,7 @@ def _of_profile(file: ConfigFile, schema: Schema) -> Iterator[Problem]:
                 continue
             text = f"{option.name} is {option.show(value)}, acceptable is {option.acceptable}."
             hint = "What is predicted there is a guess."
-            yield generic.problem_at("outside-profile", Severity.NOTE, file, entries[setting.name], text, hint)
+            yield file.note("outside-profile", entries[setting.name], text, hint)
 
 
 def _setting_name(file: ConfigFile, entry: Entry) -> str:

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.lint.scopes import COSTMAP, Keys, Place, Scoped, of_class, split, words_of
 from care_core.metadata import navigation
 from care_core.metadata.navigation import STACKS, spanned, spans
@@ -89,7 +88,7 @@ def _text(file: ConfigFile, place: Place, names: Sequence[str]) -> Problem:
     text = f"{place.name} is a string, declared is a list of strings: the node will not start."
     hint = f"Write [{', '.join(repr(name) for name in names)}]."
     source = f"{STACKS['ros2']} declare a list of strings"
-    return problem_at("wrong-type", Severity.ERROR, file, place.entry, text, hint, source)
+    return file.error("wrong-type", place.entry, text, hint, source)
 
 
 def by_default(file: ConfigFile, shown: frozenset[str]) -> Iterator[Problem]:
@@ -120,7 +119,7 @@ def _defaulted(file: ConfigFile, name: str, kind: str, below: Mapping[Keys, Entr
         text = f"{name} has no class, and is a {kind} then, which does not read {unread[0][0]} and "
         text += f"{len(unread) - 1} more."
         hint = f"Write plugin with the class below {name}."
-        yield problem_at("cannot-work", Severity.WARNING, file, entry, text, hint, _CLASSLESS)
+        yield file.warning("cannot-work", entry, text, hint, _CLASSLESS)
 
 
 def spare(file: ConfigFile) -> Iterator[Problem]:
@@ -137,7 +136,7 @@ def spare(file: ConfigFile) -> Iterator[Problem]:
         kind = next((part for word, part in _KINDS if word in str(entry.value)), "")
         key = next((one.key for one in lists if kind in one.key and one.key.startswith(kind)), lists[0].key)
         text = f"Nothing loads {name}: no list of {node} names it."
-        yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
+        yield file.note("not-loaded", entry, text, f"Add it to {key}, or leave it out.")
 
 
 def _unwritten(one: PluginList) -> tuple[str, ...]:
@@ -160,7 +159,7 @@ def _classless(file: ConfigFile, place: Place, names: list[str]) -> Problem:
     below, their, them = ("each of these names", "their", "them") if names[1:] else (names[0], "its", "it")
     text = f"{place.name} names {', '.join(names)}, and nothing here says {their} class: {what} will not start."
     hint = f"Write plugin with the class below {below}, or leave {them} out."
-    return problem_at("cannot-work", Severity.WARNING, file, place.entry, text, hint, _CLASSLESS)
+    return file.warning("cannot-work", place.entry, text, hint, _CLASSLESS)
 
 
 # Values beside the list
@@ -247,8 +246,8 @@ def _raised(
         hint = f"Write those that {plugin.name} lacks below it, and leave the others out."
     else:
         hint = f"Leave them out: {plugin.name} has its own."
-    others = tuple(one.entry.name for one in more)
-    return problem_at("misplaced-key", Severity.WARNING, file, first.entry, text, hint, STACKS["ros2"], others)
+    others = [one.entry for one in more]
+    return file.warning("misplaced-key", first.entry, text, hint, STACKS["ros2"], others)
 
 
 def _consequence(plugin: Loaded, lacking: Sequence[Place], shown: frozenset[str]) -> str:

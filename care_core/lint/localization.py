@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.generic import near, problem_at
+from care_core.lint.generic import near
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.readers import numbers, warning
+from care_core.lint.readers import numbers
 
 _SOURCE = re.compile(r"(odom|pose|twist|imu)(\d+)")
 _OF_SOURCE = re.compile(r"((?:odom|pose|twist|imu)\d+)_(\w+)")
@@ -105,7 +105,7 @@ def _unread(file: ConfigFile, values: Values, known: tuple[str, ...]) -> Iterato
             text = f"No parameter {name} of robot_localization is known."
             hint = f"Did you mean {meant}?" if meant else "Leave it out, unless a release of yours has it."
             severity = Severity.WARNING if meant else Severity.NOTE
-            yield problem_at("unknown-key", severity, file, entry, text, hint, _ROS_FILTER)
+            yield file.problem("unknown-key", severity, entry, text, hint, _ROS_FILTER)
 
 
 def _sources(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -123,25 +123,25 @@ def _fused(file: ConfigFile, values: Values, source: str, entry: Entry) -> Itera
         severity = Severity.WARNING if is_told else Severity.NOTE
         text = f"{entry.keys[-1]} has no {source} beside it: without its topic nothing of this source is fused."
         hint = f"Write the topic as {source}, unless the launch file names it."
-        yield problem_at("cannot-work", severity, file, entry, text, hint, _ROS_FILTER)
+        yield file.problem("cannot-work", severity, entry, text, hint, _ROS_FILTER)
     if len(flags) != len(_STATE):
         text = f"{entry.keys[-1]} has {len(flags)} entries instead of {len(_STATE)}: what is fused is undefined."
         hint = "Write x y z, roll pitch yaw, their rates in the same order, and the accelerations in x y z."
-        yield problem_at("cannot-work", Severity.ERROR, file, entry, text, hint, _ROS_FILTER)
+        yield file.error("cannot-work", entry, text, hint, _ROS_FILTER)
         return
     wanted = [word for word, flag in zip(_STATE, flags, strict=True) if flag == "true"]
     carried, why = _CARRIES[source.rstrip("0123456789")]
     lacking = [word for word in wanted if word not in carried]
     if not wanted:
         text = f"{entry.keys[-1]} is false throughout: {source} is not heard at all."
-        yield warning("cannot-work", file, entry, text, "Set what it measures to true.", _ROS_FILTER)
+        yield file.warning("cannot-work", entry, text, "Set what it measures to true.", _ROS_FILTER)
     elif lacking:
         text = f"{entry.keys[-1]} asks for {', '.join(lacking)}, and {why}: that is not fused."
-        yield warning("dead-key", file, entry, text, "Set it to false.", _ROS_FILTER)
+        yield file.warning("dead-key", entry, text, "Set it to false.", _ROS_FILTER)
     both = [values.get(f"{source}_{mode}") for mode in ("differential", "relative")]
     if all(one is not None and one.value == "true" for one in both) and both[1] is not None and both[0] is not None:
         text = f"{source}_differential and {source}_relative are both true: only the first counts."
-        yield warning("contradiction", file, both[1], text, "Switch one of them off.", _ROS_FILTER, [both[0]])
+        yield file.warning("contradiction", both[1], text, "Switch one of them off.", _ROS_FILTER, [both[0]])
 
 
 def _headings(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -160,7 +160,7 @@ def _headings(file: ConfigFile, values: Values) -> Iterator[Problem]:
         text = f"{odom.keys[-1]} and {imu.keys[-1]} both give the heading: they drift apart, and the filter jumps."
         hint = "Take the heading from one, and the turn rate from the other."
         source = "robot_localization's documentation of differential"
-        yield problem_at("hinders", Severity.NOTE, file, imu, text, hint, source, (odom.name,))
+        yield file.note("hinders", imu, text, hint, source, [odom])
 
 
 def _of_filter(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -170,7 +170,7 @@ def _of_filter(file: ConfigFile, values: Values) -> Iterator[Problem]:
         own = len(re.findall(r"[^\s,\[\]]+", str(entry.value))) if entry is not None and entry.kind == "list" else 0
         if entry is not None and own and own not in lengths:
             text = f"{name} has {own} numbers instead of {lengths[0]}: it is refused, or read past its end."
-            yield problem_at("cannot-work", Severity.ERROR, file, entry, text, "Count its rows.", _ROS_FILTER)
+            yield file.error("cannot-work", entry, text, "Count its rows.", _ROS_FILTER)
     yield from _rate(file, values)
 
 
@@ -178,7 +178,7 @@ def _rate(file: ConfigFile, values: Values) -> Iterator[Problem]:
     entry = values.get("frequency")
     if entry is not None and entry.number is not None and entry.number <= 0:
         text = f"frequency is {entry.number:g}: nothing is ever published."
-        yield warning("cannot-work", file, entry, text, "It must be above 0.", _ROS_FILTER)
+        yield file.warning("cannot-work", entry, text, "It must be above 0.", _ROS_FILTER)
 
 
 def _joined(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -190,13 +190,13 @@ def _joined(file: ConfigFile, values: Values) -> Iterator[Problem]:
         if frames[one] == frames[other]:
             text = f"{one} and {other} are both {frames[one]}: the filter refuses such frames."
             hint = "Map, odometry and robot are three frames (REP 105)."
-            yield warning("cannot-work", file, values[other], text, hint, _ROS_FILTER, [values[one]])
+            yield file.warning("cannot-work", values[other], text, hint, _ROS_FILTER, [values[one]])
     world = values.get("world_frame")
     known = {frames.get("map_frame", "map"), frames.get("odom_frame", "odom")}
     if world is not None and str(world.value).strip("/") not in known and not re.search(r"[$<{]", str(world.value)):
         text = f"world_frame is {world.value}, which is neither map_frame nor odom_frame."
         hint = "Give it the value of odom_frame for odometry alone, of map_frame where positions are absolute."
-        yield warning("contradiction", file, world, text, hint, f"{_ROS_FILTER}; REP 105")
+        yield file.warning("contradiction", world, text, hint, f"{_ROS_FILTER}; REP 105")
 
 
 def _of_navsat(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -205,13 +205,13 @@ def _of_navsat(file: ConfigFile, values: Values) -> Iterator[Problem]:
         if entry is not None and entry.number is not None and abs(entry.number) > _MOST_RADIANS:
             text = f"{name} is {entry.number:g} rad, more than a whole turn."
             hint = f"Is it in degrees? {math.radians(entry.number):.4g} rad would be."
-            yield warning("wrong-unit", file, entry, text, hint, "an angle is at most 2 pi")
+            yield file.warning("wrong-unit", entry, text, hint, "an angle is at most 2 pi")
     yield from _rate(file, values)
     entry, datum = values.get("wait_for_datum"), values.get("datum")
     if entry is not None and entry.value == "true" and datum is None and file.text:
         text = "wait_for_datum is on, and no datum stands beside it: the origin is 0, 0 or waits for a service call."
         hint = "Write datum: [latitude, longitude, heading], unless a node calls the service."
-        yield problem_at("hinders", Severity.NOTE, file, entry, text, hint, _NAVSAT_SOURCE)
+        yield file.note("hinders", entry, text, hint, _NAVSAT_SOURCE)
     elif datum is not None and datum.kind == "list" and len(numbers(datum)) < 3 and "," in str(datum.value):
         text = "datum holds less than latitude, longitude and heading."
-        yield warning("cannot-work", file, datum, text, "Give it all three.", _NAVSAT_SOURCE)
+        yield file.warning("cannot-work", datum, text, "Give it all three.", _NAVSAT_SOURCE)

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from difflib import SequenceMatcher
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.generic import near, problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.generic import near
+from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.lint.scopes import Keys, Scoped, split
 from care_core.metadata import navigation
 from care_core.metadata.navigation import STACKS, Ros
@@ -48,7 +48,7 @@ def _parts(file: ConfigFile, ros: Ros) -> Iterator[Problem]:
             what = "node of Nav2" if ros == "ros2" else "part of move_base"
             text = f"No {what} is called {keys[-1]}: nothing reads what stands below it."
             hint = f"Did you mean {meant}?"
-            yield problem_at("unknown-key", Severity.WARNING, file, entries[0], text, hint, STACKS[ros])
+            yield file.warning("unknown-key", entries[0], text, hint, STACKS[ros])
 
 
 def _meant(name: str, entries: Sequence[Entry], ros: Ros) -> str:
@@ -74,4 +74,4 @@ def _classes(file: ConfigFile) -> Iterator[Problem]:
         meant = near(name, known)
         if meant:
             text = f"{entry.keys[-1]} is {name}, which its package does not have: move_base does not start."
-            yield problem_at("plugin-name", Severity.ERROR, file, entry, text, f"Did you mean {meant}?", _CLASSES)
+            yield file.error("plugin-name", entry, text, f"Did you mean {meant}?", _CLASSES)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Problem, Severity
-from care_core.lint.readers import Reader, Readers, numbers, warning
+from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.readers import Reader, Readers, numbers
 from care_core.lint.scopes import split, words_of
 
 _NODES = ("collision_monitor", "collision_detector")
@@ -30,7 +29,7 @@ def _types(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                     continue
                 text = f"type of {name} is {entry.value}, which is none of its values: the node will not start."
                 hint = f"They are {', '.join(known)}."
-                yield problem_at("not-in-values", Severity.ERROR, file, entry, text, hint, _SOURCE)
+                yield file.error("not-in-values", entry, text, hint, _SOURCE)
 
 
 def _shapeless(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -42,7 +41,7 @@ def _shapeless(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if entry is not None and entry.kind == "list" and missing and file.text:
             text = f"polygons names {missing[0]}, and nothing here says its type: the node will not start."
             hint = f"Write the part {missing[0]} with its type, or leave it out of the list."
-            yield warning("cannot-work", file, entry, text, hint, _SOURCE)
+            yield file.warning("cannot-work", entry, text, hint, _SOURCE)
 
 
 def _points(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -53,7 +52,7 @@ def _points(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if entry is not None and count and (count % 2 or count < _LEAST):
             text = f"points of {reader.name()} has {count} numbers: the node will not start."
             hint = "Write x and y of each corner, of at least three."
-            yield problem_at("cannot-work", Severity.ERROR, file, entry, text, hint, "polygon.cpp, getParameters")
+            yield file.error("cannot-work", entry, text, hint, "polygon.cpp, getParameters")
 
 
 def _unheard(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -67,7 +66,7 @@ def _unheard(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if entry is not None and missing and spare:
             text = f"observation_sources names {missing[0]}, which nothing describes, and not {spare[0]}: the node "
             text += "listens to a laser on scan."
-            yield warning("cannot-work", file, entry, text, f"Is {spare[0]} meant?", _SOURCE)
+            yield file.warning("cannot-work", entry, text, f"Is {spare[0]} meant?", _SOURCE)
 
 
 def _around(file: ConfigFile, reader: Reader) -> set[str]:
@@ -88,7 +87,7 @@ def _circular(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if entry is not None and out is not None and str(entry.value).strip("/") == str(out.value).strip("/"):
             text = f"cmd_vel_in_topic and cmd_vel_out_topic are both {out.value}: the monitor hears its own commands."
             hint = "The controller or the smoother has to send to another topic than the base listens to."
-            yield warning("contradiction", file, out, text, hint, "collision_monitor_node.cpp", [entry])
+            yield file.warning("contradiction", out, text, hint, "collision_monitor_node.cpp", [entry])
 
 
 RULES = (_types, _shapeless, _circular, _points, _unheard)

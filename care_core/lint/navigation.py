@@ -23,7 +23,6 @@ from care_core.lint import (
     sources,
     workable,
 )
-from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED, Renamed
 from care_core.lint.scopes import COSTMAP, Place, Scoped, class_of, costmaps, scoped, split
@@ -82,7 +81,7 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         if _is_spare(file, entry):
             continue
         text = f"Nothing loads {name}: no list of {key} names it."
-        yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
+        yield file.note("not-loaded", entry, text, f"Add it to {key}, or leave it out.")
     if result.ros == "ros2":
         yield from parsed.check(file)
         yield from _misnested(file, result)
@@ -116,7 +115,7 @@ def _no_parameters(file: ConfigFile, result: Scoped) -> Problem | None:
     if modes is not None:
         text = "This is no parameter file: it holds the modes of nodes for system_modes, with the values of each."
         hint = "Lint the parameter files of its nodes."
-        return problem_at("no-parameters", Severity.NOTE, file, modes, text, hint, "the model files of system_modes")
+        return file.note("no-parameters", modes, text, hint, "the model files of system_modes")
     named = [(one, key) for one in file.entries for key in one.keys[:-1] if key in ROS2_ALONE]
     if result.ros == "ros2" or not named:
         return None
@@ -125,7 +124,7 @@ def _no_parameters(file: ConfigFile, result: Scoped) -> Problem | None:
     text = f"This is no parameter file of ROS 2: it names {node}, and nothing in it stands below {PARAMETERS}."
     hint = f"A parameter file has NODE: {PARAMETERS}: NAME: VALUE."
     severity = Severity.WARNING if is_meant else Severity.NOTE
-    return problem_at("no-parameters", severity, file, first, text, hint)
+    return file.problem("no-parameters", severity, first, text, hint)
 
 
 def values(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
@@ -172,7 +171,7 @@ def _place(
         return
     dead = _dead(result, place)
     if dead:
-        yield problem_at("dead-key", Severity.WARNING, file, place.entry, *dead, _COSTMAP_SOURCE)
+        yield file.warning("dead-key", place.entry, *dead, _COSTMAP_SOURCE)
         return
     yield from _value(file, place.entry, here or facts, ros)
 
@@ -201,8 +200,8 @@ def _other_distribution(
     for one, new in _renames(result, place):
         if any(order.index(name) >= order.index(one.since) for name in likely):
             text = f"{place.name} is {new} since {one.since}{told}."
-            return problem_at(
-                "renamed", severity, file, place.entry, text, f"Write {new.rpartition('.')[2]}.", STACKS[result.ros]
+            return file.problem(
+                "renamed", severity, place.entry, text, f"Write {new.rpartition('.')[2]}.", STACKS[result.ros]
             )
     if not is_told or not _is_covered(result, place.owners[0], likely):
         return None
@@ -210,8 +209,8 @@ def _other_distribution(
     text = (
         f"{place.owners[0]} reads {place.name} in {navigation.spans(known, result.ros)}, not in {next(iter(likely))}."
     )
-    return problem_at(
-        "unknown-key", severity, file, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
+    return file.problem(
+        "unknown-key", severity, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
     )
 
 
@@ -270,7 +269,7 @@ def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact], ros: str) -> I
         text = f"{entry.keys[-1]} is {_a(entry.kind)}, declared is {_a(' or '.join(sorted(types)))}: {refused}."
         severity = Severity.ERROR if ros == "ros2" else Severity.WARNING
         hint = _rescaled(fact, entry, types) or _as_type(entry, types)
-        yield problem_at("wrong-type", severity, file, entry, text, hint, fact.source)
+        yield file.problem("wrong-type", severity, entry, text, hint, fact.source)
         return
     number = entry.number
     if number is None:
@@ -278,14 +277,14 @@ def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact], ros: str) -> I
     if fact.values and not any(number == code for code, _ in fact.values):
         listed = ", ".join(f"{code:g} ({label})" for code, label in fact.values)
         text = f"{entry.keys[-1]} is {number:g}, which is none of its values."
-        yield problem_at("not-in-values", Severity.WARNING, file, entry, text, f"They are {listed}.", fact.source)
+        yield file.warning("not-in-values", entry, text, f"They are {listed}.", fact.source)
     elif all(_is_outside(number, one) for one in facts):
         text = f"{entry.keys[-1]} is {number:g}, {_bounds(fact)}: the node takes the bound."
-        yield problem_at("out-of-range", Severity.WARNING, file, entry, text, "", fact.source)
+        yield file.warning("out-of-range", entry, text, "", fact.source)
     elif _ANGLE_TOLERANCE.search(entry.keys[-1]) and math.pi < abs(number) <= 360 and number > 2 * math.pi:
         text = f"{entry.keys[-1]} is {number:g} rad, more than a whole turn."
         hint = f"Is it in degrees? {math.radians(number):.4g} rad would be."
-        yield problem_at("wrong-unit", Severity.WARNING, file, entry, text, hint, "an angle is at most 2 pi")
+        yield file.warning("wrong-unit", entry, text, hint, "an angle is at most 2 pi")
 
 
 def _bounds(fact: Fact) -> str:
@@ -348,7 +347,7 @@ def _misnested(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
         node = (*keys, keys[-1])
         text = f"Nothing reads this part: the costmap is the node /{'/'.join(node)}, not /{'/'.join(keys)}."
         hint = f"Write {': '.join((*node, PARAMETERS))}:, each below the other. What nobody reads is not judged here."
-        yield problem_at("misplaced-key", Severity.WARNING, file, entry, text, hint, _NAMESPACE)
+        yield file.warning("misplaced-key", entry, text, hint, _NAMESPACE)
 
 
 def _nodes(file: ConfigFile, releases: frozenset[str], *, is_told: bool) -> Iterator[Problem]:
@@ -370,7 +369,7 @@ def _nodes(file: ConfigFile, releases: frozenset[str], *, is_told: bool) -> Iter
             continue
         text = f"The node {old} is {new} since {since}: later distributions do not read this part."
         severity = Severity.WARNING if newer and all(newer) and new not in nodes else Severity.NOTE
-        yield problem_at("renamed", severity, file, nodes[old], text, f"Name it {new}, {also}.", STACKS["ros2"])
+        yield file.problem("renamed", severity, nodes[old], text, f"Name it {new}, {also}.", STACKS["ros2"])
 
 
 def _unused(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
@@ -389,7 +388,7 @@ def _unused(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
             text += f", which reaches from {inner:.3g} to {outer:.3g} m"
         severity = Severity.NOTE if is_alike else Severity.WARNING
         hint = f"Leave one of the two out{f'; the other is in line {footprint.line}' if footprint.line else ''}."
-        yield problem_at("dead-key", severity, file, radius, f"{text}.", hint, _SHAPE, (footprint.name,))
+        yield file.problem("dead-key", severity, radius, f"{text}.", hint, _SHAPE, [footprint])
 
 
 def _contradictions(file: ConfigFile, result: Scoped) -> Iterator[Problem]:

@@ -10,8 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import ConfigFile, Entry, Problem
 
 Values = Mapping[str, Entry]
 
@@ -62,8 +61,7 @@ def _whole(values: Values, name: str) -> int | None:
 
 
 def _warning(file: ConfigFile, entry: Entry, text: str, hint: str, source: str, *others: Entry) -> Problem:
-    names = tuple(one.name for one in others)
-    return problem_at("contradiction", Severity.WARNING, file, entry, text, hint, source, names)
+    return file.warning("contradiction", entry, text, hint, source, others)
 
 
 # ArduPilot
@@ -230,8 +228,7 @@ def _px4_motors(file: ConfigFile, values: Values) -> Iterator[Problem]:
         first, *more = (entry for entry in twice if entry.number == number)
         text = f"{' and '.join(one.name for one in (first, *more))} both drive motor {int(number or 0) - 100}."
         hint = "Leave one of them out, unless two ESCs are meant."
-        names = tuple(one.name for one in more)
-        yield problem_at("contradiction", Severity.NOTE, file, first, text, hint, source, names)
+        yield file.note("contradiction", first, text, hint, source, more)
 
 
 def _px4_rotors(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -247,7 +244,7 @@ def _px4_rotors(file: ConfigFile, values: Values) -> Iterator[Problem]:
     if np.linalg.matrix_rank(rows / np.maximum(np.abs(rows).max(axis=0), _SMALL), tol=_SMALL) < rows.shape[1]:
         text = "The rotors stand in a line: roll, pitch and thrust cannot be set apart from each other."
         hint = "Check where CA_ROTORn_PX and PY put them, forwards and to the right."
-        yield problem_at("cannot-work", Severity.WARNING, file, values["CA_ROTOR_COUNT"], text, hint, _ALLOCATION)
+        yield file.warning("cannot-work", values["CA_ROTOR_COUNT"], text, hint, _ALLOCATION)
 
 
 def _is_tilted(values: Values, rotor: int) -> bool:
@@ -274,6 +271,5 @@ def _px4_height(file: ConfigFile, values: Values) -> Iterator[Problem]:
     if held is not None and not held & bit:
         text = f"EKF2_HGT_REF is {reference}, and {switch} leaves {what} out: EKF2 switches it on as it starts."
         hint = f"Add {bit} to {switch}, or take another reference."
-        names = (switch,)
         entry = values["EKF2_HGT_REF"]
-        yield problem_at("contradiction", Severity.NOTE, file, entry, text, hint, "EKF2.cpp, VerifyParams", names)
+        yield file.note("contradiction", entry, text, hint, "EKF2.cpp, VerifyParams", [values[switch]])

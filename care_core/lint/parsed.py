@@ -8,8 +8,7 @@ from collections.abc import Iterator
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import nearest
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import ConfigFile, Entry, Problem
 from care_core.metadata import navigation
 
 _PARSER = "parse.c of rcl_yaml_param_parser"
@@ -38,7 +37,7 @@ def _quoted(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
         text = "use_sim_time is a string, declared is true or false: a node that is given it so will not start."
         plain = word if word in ("true", "false") else "true or false"
         hint = f"Write {plain} without quotes, unless the launch file sets it."
-        yield problem_at("wrong-type", Severity.WARNING, file, entry, text, hint, "time_source.cpp of rclcpp")
+        yield file.warning("wrong-type", entry, text, hint, "time_source.cpp of rclcpp")
 
 
 def _mixed(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
@@ -52,7 +51,7 @@ def _mixed(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
     plain = [float(one) for one in items if isinstance(one, (int, float)) and not isinstance(one, bool)]
     if len(plain) == len(items):
         hint = f"Write [{', '.join(repr(one) for one in plain)}]." if len(plain) <= _SHORT else _DECIMALS
-    yield problem_at("wrong-type", Severity.ERROR, file, entry, text, hint, f"{_PARSER}, parse_value")
+    yield file.error("wrong-type", entry, text, hint, f"{_PARSER}, parse_value")
 
 
 def _nested(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
@@ -61,7 +60,7 @@ def _nested(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
     if len(items) > 1 and any(isinstance(one, list) for one in items):
         text = f"{entry.keys[-1]} is a list of lists: ROS 2 refuses the whole file, no node starts with it."
         hint = "Put it in quotes, where the node reads a text, or write one flat list."
-        yield problem_at("wrong-type", Severity.ERROR, file, entry, text, hint, f"{_PARSER}, parse_file_events")
+        yield file.error("wrong-type", entry, text, hint, f"{_PARSER}, parse_file_events")
 
 
 def _items(text: str) -> list[object]:
@@ -83,7 +82,7 @@ def _outside(file: ConfigFile) -> Iterator[Problem]:
         text = f"{entry.keys[-1]} of {node} does not stand below {PARAMETERS}: ROS 2 refuses the whole file."
         meant = next((key for key in entry.keys[:-1] if nearest(key, [PARAMETERS])), "")
         hint = f"Write {PARAMETERS} for {meant}." if meant else f"Write {node}: {PARAMETERS}:, and the values below."
-        yield problem_at("no-parameters", Severity.ERROR, file, entry, text, hint, f"{_PARSER}, parse_key")
+        yield file.error("no-parameters", entry, text, hint, f"{_PARSER}, parse_key")
 
 
 def _is_node(name: str) -> bool:

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.readers import COLLISIONS
 from care_core.lint.rules import ROS2_NODES_RENAMED
@@ -112,20 +111,20 @@ def _never(file: ConfigFile, entry: Entry, name: str) -> Iterator[Problem]:
     if meant:
         text = f"No release of Nav2 loads a plugin by the name {name}."
         hint = f"Did you mean {meant[-1]}?"
-        yield problem_at("plugin-name", Severity.ERROR, file, entry, text, hint, plugins.SOURCE)
+        yield file.error("plugin-name", entry, text, hint, plugins.SOURCE)
 
 
 def _elsewhere(file: ConfigFile, entry: Entry, name: str, releases: frozenset[str], distribution: str) -> Problem:
     now = next((one for one, held in plugins.spellings(name).items() if distribution in held), "")
     if now:
         text = f"{name} is {now} in {distribution}, which does not know the other spelling."
-        return problem_at("plugin-name", Severity.ERROR, file, entry, text, f"Write {now}.", plugins.SOURCE)
+        return file.error("plugin-name", entry, text, f"Write {now}.", plugins.SOURCE)
     text = f"{name} is a plugin of {spans(releases, 'ros2')}, not of {distribution}"
     is_asked = plugins.is_loaded_in(name, distribution)
     text += "." if is_asked else ", which loads none of its kind."
     severity = Severity.ERROR if is_asked else Severity.WARNING
     hint = "Is the file for this distribution?"
-    return problem_at("plugin-name", severity, file, entry, text, hint, plugins.SOURCE)
+    return file.problem("plugin-name", severity, entry, text, hint, plugins.SOURCE)
 
 
 def _beside(file: ConfigFile, known: list[tuple[Entry, frozenset[str]]]) -> Iterator[Problem]:
@@ -139,8 +138,8 @@ def _beside(file: ConfigFile, known: list[tuple[Entry, frozenset[str]]]) -> Iter
         own, other = spans(releases, "ros2"), spans(usual, "ros2")
         text = f"{name} is loaded in {own}, and the other plugins of this file in {other}."
         hint = f"Write {now[0]}." if now else "No release loads all of them."
-        others = tuple(one.name for one, held in known if not held & releases)
-        yield problem_at("plugin-name", Severity.WARNING, file, entry, text, hint, plugins.SOURCE, others)
+        others = [one for one, held in known if not held & releases]
+        yield file.warning("plugin-name", entry, text, hint, plugins.SOURCE, others)
 
 
 # Critics
@@ -171,7 +170,7 @@ def _listed(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: s
         if other and (*here, name, "class") not in values:
             text = f"{name} is a critic of {other}, not of {owner}: the controller does not load."
             hint = f"Leave it out, or load {other}."
-            yield problem_at("plugin-name", Severity.ERROR, file, entry, text, hint, _LOADS[owner])
+            yield file.error("plugin-name", entry, text, hint, _LOADS[owner])
 
 
 def _unlisted(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
@@ -190,10 +189,10 @@ def _unlisted(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner:
         if meant:
             text = f"{name} is {meant} in the list of critics: nothing reads this part."
             hint = f"Name the part {meant}, as the list does."
-            yield problem_at("misplaced-key", Severity.WARNING, file, value, text, hint, _READS[owner])
+            yield file.warning("misplaced-key", value, text, hint, _READS[owner])
         else:
             text = f"Nothing loads {name}: the list of critics does not name it."
-            yield problem_at("not-loaded", Severity.NOTE, file, value, text, "Add it to critics, or leave it out.")
+            yield file.note("not-loaded", value, text, "Add it to critics, or leave it out.")
 
 
 def _plain(critic: str) -> str:
@@ -216,7 +215,7 @@ def _blind(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: st
     mend = f"Raise the scale of {looking[0]}." if off and owner == _DWB else f"Switch {looking[0]} on." if off else ""
     hint = mend or f"Add {' or '.join(plain)} to the list."
     at = off[0] if off else entry
-    yield problem_at("hinders", Severity.WARNING, file, at, text, hint, _BLIND[owner], (entry.name,) if off else ())
+    yield file.warning("hinders", at, text, hint, _BLIND[owner], [entry] if off else [])
 
 
 def _class_of_critic(values: Mapping[Keys, Entry], here: Keys, owner: str, name: str) -> str:
@@ -247,7 +246,7 @@ def _parts(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: st
             text = f"{name} is a critic of {other}, not of {owner}: nothing reads this part."
             hint = f"Leave it out, or load {other}."
             source = _LOADS.get(owner, f"the sources of {owner} name no critics")
-            yield problem_at("misplaced-key", Severity.WARNING, file, entry, text, hint, source)
+            yield file.warning("misplaced-key", entry, text, hint, source)
 
 
 def _of_other(name: str, owner: str) -> str:

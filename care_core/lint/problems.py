@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import Enum
 from pathlib import Path
 
 from care_core.ecosystems.dialect import Dialect
+from care_core.lint.rules import BY_ID
 from care_core.records import Record
 
 
@@ -41,18 +43,6 @@ class Entry(Record):
         return None if isinstance(self.value, str) else float(self.value)
 
 
-class ConfigFile(Record):
-    """A configuration file, read as far as it can be."""
-
-    path: Path
-    format: Dialect
-    text: str
-    entries: tuple[Entry, ...]
-    named: tuple[tuple[tuple[str, ...], str, str], ...] = ()
-    """Plugins that a list of mappings names (ROS 1): the keys of the list, the name, the class."""
-    namespace: str = ""
-
-
 class Problem(Record):
     """Something wrong at one place of a file."""
 
@@ -68,3 +58,45 @@ class Problem(Record):
     """Where the rule has it from."""
     others: tuple[str, ...] = ()
     """The other parameters that it takes to be wrong, as the file names them."""
+
+
+class ConfigFile(Record):
+    """A configuration file, read as far as it can be."""
+
+    path: Path
+    format: Dialect
+    text: str
+    entries: tuple[Entry, ...]
+    named: tuple[tuple[tuple[str, ...], str, str], ...] = ()
+    """Plugins that a list of mappings names (ROS 1): the keys of the list, the name, the class."""
+    namespace: str = ""
+
+    def problem(
+        self,
+        rule: str,
+        severity: Severity,
+        entry: Entry,
+        text: str,
+        hint: str = "",
+        source: str = "",
+        others: Iterable[Entry] = (),
+    ) -> Problem:
+        """A problem at an entry; `source` where it is not the rule's own."""
+        where = (self.path, entry.line, entry.column, entry.name)
+        named = tuple(one.name for one in others)
+        return Problem(rule, severity, *where, text, hint, source or BY_ID[rule].source, named)
+
+    def error(
+        self, rule: str, entry: Entry, text: str, hint: str = "", source: str = "", others: Iterable[Entry] = ()
+    ) -> Problem:
+        return self.problem(rule, Severity.ERROR, entry, text, hint, source, others)
+
+    def warning(
+        self, rule: str, entry: Entry, text: str, hint: str = "", source: str = "", others: Iterable[Entry] = ()
+    ) -> Problem:
+        return self.problem(rule, Severity.WARNING, entry, text, hint, source, others)
+
+    def note(
+        self, rule: str, entry: Entry, text: str, hint: str = "", source: str = "", others: Iterable[Entry] = ()
+    ) -> Problem:
+        return self.problem(rule, Severity.NOTE, entry, text, hint, source, others)

@@ -10,7 +10,6 @@ from collections.abc import Collection, Iterator, Sequence
 from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.lint.documented import meant_instead, not_listed, share_known, unknown_bits
-from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import px4
 from care_core.metadata.fact import Fact
@@ -74,7 +73,7 @@ def read_as_numbers(file: ConfigFile) -> tuple[ConfigFile, tuple[Problem, ...]]:
     text = f"{broken[0].name} is not a number, nor is any of the {len(whole)} whole numbers here what the vehicle has: "
     text += "they were stored byte by byte as decimal ones."
     hint = "Save the file with QGroundControl, or `param show` of PX4 itself. They are not judged here."
-    problem = problem_at("wrong-type", Severity.ERROR, file, broken[0], text, hint, _BYTEWISE)
+    problem = file.error("wrong-type", broken[0], text, hint, _BYTEWISE)
     kept = tuple(entry for entry in file.entries if entry not in whole)
     return replace(file, entries=kept), (problem,)
 
@@ -92,9 +91,9 @@ def _unknown(file: ConfigFile, entry: Entry) -> Problem:
     meant = meant_instead(entry.name, {one.name for one in file.entries}, px4.names())
     if meant:
         text = f"No release of PX4 from {px4.RELEASES[0]} on has a parameter {entry.name}."
-        return problem_at("unknown-key", Severity.WARNING, file, entry, text, f"Did you mean {meant}?", _LISTS)
+        return file.warning("unknown-key", entry, text, f"Did you mean {meant}?", _LISTS)
     text = f"PX4's lists have no parameter {entry.name}: a custom build's, or of an older release."
-    return problem_at("unknown-key", Severity.NOTE, file, entry, text, "Check its spelling.", _LISTS)
+    return file.note("unknown-key", entry, text, "Check its spelling.", _LISTS)
 
 
 def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[str], *, is_told: bool) -> Problem:
@@ -104,10 +103,10 @@ def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[str], *, is_to
     if px4.known_in(new) & set(releases):
         hint = f"Write {new}{'' if factor == 1 else f', and its value times {factor:.4g}'}."
         severity = Severity.WARNING if is_told else Severity.NOTE
-        return problem_at("renamed", severity, file, entry, f"{entry.name} is {new} in {told}.", hint, _TRANSLATED)
+        return file.problem("renamed", severity, entry, f"{entry.name} is {new} in {told}.", hint, _TRANSLATED)
     text = f"{entry.name} is not in {told}, but in {px4.span(px4.known_in(entry.name))}."
     severity = Severity.WARNING if is_told else Severity.NOTE
-    return problem_at("unknown-key", severity, file, entry, text, "Is the file for this firmware?", _LISTS)
+    return file.problem("unknown-key", severity, entry, text, "Is the file for this firmware?", _LISTS)
 
 
 def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
@@ -118,7 +117,7 @@ def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Pr
     fact, unit = facts[-1], f" {facts[-1].unit}" if facts[-1].unit else ""
     if all(one.type in ("int", "bool") for one in facts) and not value.is_integer():
         text = f"{entry.name} is {value:g}, and PX4 counts it in whole numbers."
-        yield problem_at("wrong-type", Severity.WARNING, file, entry, text, "", fact.source)
+        yield file.warning("wrong-type", entry, text, "", fact.source)
     elif all(one.bits for one in facts):
         yield from unknown_bits(file, entry, value, facts)
     elif all(one.values for one in facts):
@@ -128,7 +127,7 @@ def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Pr
         severity = Severity.WARNING if all(_is_far(value, one) for one in facts) else Severity.NOTE
         text = f"{entry.name} is {value:g}{unit}, outside {_range(fact)}."
         hint = "The firmware takes it all the same."
-        yield problem_at("out-of-range", severity, file, entry, text, hint, fact.source)
+        yield file.problem("out-of-range", severity, entry, text, hint, fact.source)
 
 
 def _within(value: float, fact: Fact) -> bool:

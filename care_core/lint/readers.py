@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry
 from care_core.lint.scopes import Keys, Scoped
 from care_core.records import Struct, field
 
@@ -94,12 +93,6 @@ def readers(result: Scoped) -> Readers:
             reader = found.setdefault((place.owners, place.scope), Reader(place.owners, place.scope))
             reader.values[place.name] = place.entry
     return Readers(found.values())
-
-
-def warning(
-    rule: str, file: ConfigFile, entry: Entry, text: str, hint: str, source: str, others: Sequence[Entry] = ()
-) -> Problem:
-    return problem_at(rule, Severity.WARNING, file, entry, text, hint, source, tuple(one.name for one in others))
 
 
 def numbers(entry: Entry | None) -> list[float]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from care_core.lint.contradictions import reach
 from care_core.lint.problems import ConfigFile, Entry, Problem
-from care_core.lint.readers import Readers, readers, warning
+from care_core.lint.readers import Readers, readers
 from care_core.lint.scopes import COSTMAP, Scoped
 from care_core.metadata.navigation import spanned
 
@@ -37,7 +37,7 @@ def check(file: ConfigFile, result: Scoped, likely: frozenset[str]) -> Iterator[
             text += "never backs up."
             others = [one for name, one in reader.values.items() if name == "use_rotate_to_heading"]
             source = "regulated_pure_pursuit_controller.cpp of galactic to iron"
-            yield warning("contradiction", file, entry, text, "Switch one of them off.", source, others)
+            yield file.warning("contradiction", entry, text, "Switch one of them off.", source, others)
 
 
 def _trees(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -48,7 +48,7 @@ def _trees(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             if entry is not None and _BARE.fullmatch(str(entry.value)):
                 text = f"{name} is {entry.value}, without a folder: bt_navigator opens it where it was started."
                 hint = "Write the whole path: without its tree it takes no goal."
-                yield warning("cannot-work", file, entry, text, hint, "bt_action_server_impl.hpp, loadBehaviorTree")
+                yield file.warning("cannot-work", entry, text, hint, "bt_action_server_impl.hpp, loadBehaviorTree")
 
 
 def _shapes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -58,9 +58,7 @@ def _shapes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         corners = None if entry is None else _corners(entry)
         if entry is not None and corners is not None and 0 < corners < _CORNERS:
             text = f"footprint has less than {_CORNERS} corners: it is refused, and robot_radius counts."
-            yield warning(
-                "cannot-work", file, entry, text, "Give it all of its corners.", "footprint.cpp of costmap_2d"
-            )
+            yield file.warning("cannot-work", entry, text, "Give it all of its corners.", "footprint.cpp of costmap_2d")
 
 
 def _far(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -70,10 +68,10 @@ def _far(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         far = None if footprint is None else reach(footprint)
         if footprint is not None and far is not None and far > _LARGEST_M:
             text = f"A corner of footprint is {far:g} m from the robot's centre."
-            yield warning("wrong-unit", file, footprint, text, "Is it in centimetres? It is in metres.", _METRES)
+            yield file.warning("wrong-unit", footprint, text, "Is it in centimetres? It is in metres.", _METRES)
         elif radius is not None and (radius.number or 0.0) > _LARGEST_M and not reader.has_footprint():
             text = f"robot_radius is {radius.number:g} m."
-            yield warning("wrong-unit", file, radius, text, "Is it in centimetres? It is in metres.", _METRES)
+            yield file.warning("wrong-unit", radius, text, "Is it in centimetres? It is in metres.", _METRES)
 
 
 def _corners(entry: Entry) -> int | None:

@@ -8,9 +8,8 @@ from collections.abc import Iterator, Mapping
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import nearest
-from care_core.lint.generic import near, problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.readers import warning
+from care_core.lint.generic import near
+from care_core.lint.problems import ConfigFile, Entry, Problem
 
 _NODE = re.compile(r"\w*slam_toolbox\w*")
 _DECIMALS = (
@@ -78,10 +77,10 @@ def _names(file: ConfigFile, values: Values) -> Iterator[Problem]:
             if meant and meant not in values:
                 text = f"No parameter {name} of slam_toolbox is known."
                 hint = f"Did you mean {meant}?"
-                yield problem_at("unknown-key", Severity.WARNING, file, entry, text, hint, _COMMON)
+                yield file.warning("unknown-key", entry, text, hint, _COMMON)
         elif name in _DECIMALS and entry.kind == "int" and entry.number is not None:
             text = f"{name} is an integer, declared is a decimal number: the node will not start."
-            yield problem_at("wrong-type", Severity.ERROR, file, entry, text, f"Write {entry.number:g}.0.", _COMMON)
+            yield file.error("wrong-type", entry, text, f"Write {entry.number:g}.0.", _COMMON)
 
 
 def _words(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -90,14 +89,14 @@ def _words(file: ConfigFile, values: Values) -> Iterator[Problem]:
     if mode is not None and mode.kind == "str" and mode.value not in _MODES and "$" not in str(mode.value):
         text = f"mode is {mode.value}, which is none of its values: launch files and tools do not know it."
         hint = f"They are {', '.join(_MODES)}. {nearest(str(mode.value), _MODES)}".strip()
-        yield warning("not-in-values", file, mode, text, hint, "the parameter files of slam_toolbox")
+        yield file.warning("not-in-values", mode, text, hint, "the parameter files of slam_toolbox")
     if solver is None or "$" in str(solver.value):
         return
     package = str(solver.value).partition("::")[0]
     if solver.value not in _SOLVERS and (package == "solver_plugins" or nearest(package, ["solver_plugins"])):
         text = f"solver_plugin is {solver.value}, which no package of slam_toolbox brings: the node exits."
         hint = nearest(str(solver.value), _SOLVERS) or f"It is {_SOLVERS[0]} as it ships."
-        yield problem_at("plugin-name", Severity.ERROR, file, solver, text, hint, "solver_plugins.xml")
+        yield file.error("plugin-name", solver, text, hint, "solver_plugins.xml")
 
 
 def _map(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -109,7 +108,7 @@ def _map(file: ConfigFile, values: Values) -> Iterator[Problem]:
         hint = f"Write {stem}."
         if ending not in _OWN_ENDINGS:
             hint += " It is the pose graph that is loaded, not an image of the map: save that first."
-        yield warning("cannot-work", file, entry, text, hint, "serialization.hpp of slam_toolbox")
+        yield file.warning("cannot-work", entry, text, hint, "serialization.hpp of slam_toolbox")
 
 
 def _frames(file: ConfigFile, values: Values) -> Iterator[Problem]:
@@ -120,7 +119,7 @@ def _frames(file: ConfigFile, values: Values) -> Iterator[Problem]:
         if entry is not None and frame in seen and "$" not in frame:
             text = f"{seen[frame].keys[-1]} and {name} are both {frame}: no scan finds its place."
             hint = "Map, odometry and robot are three frames (REP 105)."
-            yield warning("cannot-work", file, entry, text, hint, f"{_COMMON} asks tf for each", [seen[frame]])
+            yield file.warning("cannot-work", entry, text, hint, f"{_COMMON} asks tf for each", [seen[frame]])
         elif entry is not None:
             seen[frame] = entry
 
@@ -130,8 +129,8 @@ def _numbers(file: ConfigFile, values: Values) -> Iterator[Problem]:
     if period is not None and period.number == 0:
         text = "transform_publish_period is 0: it never tells where odom is on the map."
         hint = "0.02 is usual, unless another node publishes that transform."
-        yield warning("cannot-work", file, period, text, hint, f"{_COMMON}, publishTransformLoop")
+        yield file.warning("cannot-work", period, text, hint, f"{_COMMON}, publishTransformLoop")
     if heading is not None and heading.number is not None and heading.number > 2 * math.pi:
         text = f"minimum_travel_heading is {heading.number:g} rad, more than a whole turn."
         hint = f"Is it in degrees? {math.radians(heading.number):.4g} rad would be."
-        yield warning("wrong-unit", file, heading, text, hint, "an angle is at most 2 pi")
+        yield file.warning("wrong-unit", heading, text, hint, "an angle is at most 2 pi")

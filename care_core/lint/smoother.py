@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
-from care_core.lint.readers import CONTROLLERS, TOP_SPEEDS, Readers, numbers, warning
+from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.readers import CONTROLLERS, TOP_SPEEDS, Readers, numbers
 from care_core.lint.scopes import class_of
 
 _SMOOTHER = "velocity_smoother.cpp of every release, on_configure"
@@ -44,12 +43,12 @@ def _smoothed(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             for number, where, does in ((own[0], "begins", "moves"), (own[-1], "ends", "turns")):
                 if number == 0:
                     text = f"{name} of velocity_smoother {where} with 0: the robot never {does}."
-                    yield warning("cannot-work", file, entry, text, "It must be above 0.", "velocity_smoother.cpp")
+                    yield file.warning("cannot-work", entry, text, "It must be above 0.", "velocity_smoother.cpp")
         entry = reader.values.get("deadband_velocity")
         first = numbers(entry)[:1]
         if entry is not None and top is not None and top.number and first and first[0] >= top.number > 0:
             text = f"deadband_velocity ({first[0]:g}) swallows every speed up to {top.keys[-1]} ({top.number:g})."
-            yield warning("contradiction", file, entry, text, "Lower it.", "velocity_smoother.cpp", [top])
+            yield file.warning("contradiction", entry, text, "Lower it.", "velocity_smoother.cpp", [top])
 
 
 def _vectors(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -62,14 +61,14 @@ def _vectors(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             own = numbers(entry)
             if len(own) != wanted:
                 text = f"{name} has {_count(len(own), 'number')}: the node will not start."
-                yield problem_at("cannot-work", Severity.ERROR, file, entry, text, _AXES, _SMOOTHER)
+                yield file.error("cannot-work", entry, text, _AXES, _SMOOTHER)
             sign, why, source = _VECTORS[name]
             wrong = next((one for one in own if one * sign < 0), None)
             if sign and wrong is not None:
                 side = "above" if sign > 0 else "below"
                 text = f"{name} holds {wrong:g}: {why}."
                 hint = f"Each of its numbers must be 0 or {side} it."
-                yield problem_at("cannot-work", Severity.ERROR, file, entry, text, hint, source)
+                yield file.error("cannot-work", entry, text, hint, source)
 
 
 def _count(count: int, what: str) -> str:
@@ -93,7 +92,7 @@ def _slower(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                     f"max_velocity of velocity_smoother lets {limit:g} {unit} through, and {top.keys[-1]} is "
                     f"{top.number:g}: the robot {does} slower than the controller plans."
                 )
-                yield warning("hinders", file, entry, text, "Give both the same.", _CLAMPED, [top])
+                yield file.warning("hinders", entry, text, "Give both the same.", _CLAMPED, [top])
 
 
 def _one(held: Readers, names: Mapping[str, Sequence[str]]) -> Entry | None:
@@ -114,7 +113,7 @@ def _backwards(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         hint = "Give it a negative number."
         if any(class_of(str(one.value)) == "BackUp" for other in held for one in other.own("plugin")):
             hint += " What the backup behavior sends passes here as well, since jazzy."
-        yield warning("hinders", file, entry, text, hint, _CLAMPED, [back])
+        yield file.warning("hinders", entry, text, hint, _CLAMPED, [back])
 
 
 def _reversing(held: Readers) -> Iterator[Entry]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.ecosystems.ros.dialect import ROS2_YAML
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Problem, Severity
-from care_core.lint.readers import OBSTACLES, Reader, Readers, readers, warning
+from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.readers import OBSTACLES, Reader, Readers, readers
 from care_core.lint.scopes import Scoped, words_of
 from care_core.metadata.navigation import spanned
 
@@ -29,7 +28,7 @@ def _heights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 continue
             if entry is not None and entry.number == 0:
                 text = f"max_obstacle_height of {name} is 0: what it sees above the floor is not marked."
-                yield warning("cannot-work", file, entry, text, "It must be above 0.", _BUFFER)
+                yield file.warning("cannot-work", entry, text, "It must be above 0.", _BUFFER)
             elif entry is None and file.format is ROS2_YAML:
                 text = f"max_obstacle_height of {name} is not set, and 0 then: what it sees above the floor is not "
                 text += "marked."
@@ -37,7 +36,7 @@ def _heights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 hint = (
                     f"Write max_obstacle_height below {name}{', not beside it alone' if others else ''}: 2.0 is usual."
                 )
-                yield problem_at("hinders", Severity.NOTE, file, reader.values[first], text, hint, _BUFFER)
+                yield file.note("hinders", reader.values[first], text, hint, _BUFFER)
 
 
 def _sources(reader: Reader) -> tuple[str, ...]:
@@ -61,7 +60,7 @@ def check(file: ConfigFile, result: Scoped, likely: frozenset[str]) -> Iterator[
         if entry is not None and entry.kind == "list":
             text = "observation_sources is a list, declared is a string: the costmap will not start."
             hint = f'Write "{" ".join(words_of(entry))}".'
-            yield problem_at("wrong-type", Severity.ERROR, file, entry, text, hint, "obstacle_layer.cpp, onInitialize")
+            yield file.error("wrong-type", entry, text, hint, "obstacle_layer.cpp, onInitialize")
         for name in _sources(reader) if likely and likely <= _PRIVATE else ():
             yield from _relative(file, reader, name)
 
@@ -74,7 +73,7 @@ def _relative(file: ConfigFile, reader: Reader, name: str) -> Iterator[Problem]:
         return
     text = f"{topic} has no slash before it: before kilted that is /{costmap}/{topic}, unless the launch remaps it."
     source = "obstacle_layer.cpp: the node of a costmap has a namespace of its name"
-    yield problem_at("hinders", Severity.NOTE, file, entry, text, f"Is /{topic} meant?", source)
+    yield file.note("hinders", entry, text, f"Is /{topic} meant?", source)
 
 
 RULES = (_heights,)

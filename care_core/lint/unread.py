@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from difflib import SequenceMatcher
 
-from care_core.lint.generic import problem_at
-from care_core.lint.problems import ConfigFile, Problem, Severity
+from care_core.lint.problems import ConfigFile, Problem
 from care_core.lint.rules import LEFTOVERS, MEANT, PAIRED, PAIRED_SOURCE, Leftover, Paired
 from care_core.lint.scopes import COSTMAP, Keys, Place, Scoped, class_of, split, words_of
 from care_core.metadata import navigation
@@ -55,7 +54,7 @@ def unread(
     first, *_, last = DISTRIBUTIONS[result.ros]
     text = f"{place.name} is not a parameter of {' or '.join(place.owners)} in any release from {first} to {last}."
     hint = f"Did you mean {meant}?" if meant else "Leave it out." if others else "Check its spelling, or leave it out."
-    return problem_at("unknown-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
+    return file.warning("unknown-key", place.entry, text, hint, STACKS[result.ros])
 
 
 def _paired(file: ConfigFile, result: Scoped, place: Place, paired: Paired) -> Problem | None:
@@ -74,8 +73,8 @@ def _paired(file: ConfigFile, result: Scoped, place: Place, paired: Paired) -> P
         if _have_classes(file, place.scope, words_of(beside.get(paired.names))):
             rest = f" of {paired.names}, and leave {paired.classes} out" if held[1:] else ""
             hint = f"Write {paired.now} instead{rest}."
-    others = tuple(beside[name].name for name in held[1:])
-    return problem_at("renamed", Severity.WARNING, file, place.entry, text, hint, PAIRED_SOURCE, others)
+    others = [beside[name] for name in held[1:]]
+    return file.warning("renamed", place.entry, text, hint, PAIRED_SOURCE, others)
 
 
 def _have_classes(file: ConfigFile, scope: Keys, names: Sequence[str]) -> bool:
@@ -155,7 +154,7 @@ def _misplaced(file: ConfigFile, result: Scoped, place: Place, others: Sequence[
         text, hint = f"{text}, which is for {', '.join(owners)}.", "Leave it out here."
     else:
         return None
-    return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
+    return file.warning("misplaced-key", place.entry, text, hint, STACKS[result.ros])
 
 
 def _targets(result: Scoped, place: Place, others: Sequence[str]) -> list[str]:
@@ -207,4 +206,4 @@ def _leftover(file: ConfigFile, place: Place, leftover: Leftover) -> Problem | N
     name = part[-1] if part else "a goal checker"
     text = f"{place.owners[0]} does not read {place.name}: that is for {name}, where it is {other}."
     hint = f"Write {place.name}: {value} under {name}, or leave it out."
-    return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, leftover.source)
+    return file.warning("misplaced-key", place.entry, text, hint, leftover.source)

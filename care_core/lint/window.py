@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from care_core.lint.contradictions import inscribed_radius
 from care_core.lint.problems import ConfigFile, Entry, Problem
-from care_core.lint.readers import COLLISIONS, SAMPLED, Reader, Readers, warning
+from care_core.lint.readers import COLLISIONS, SAMPLED, Reader, Readers
 from care_core.lint.scopes import COSTMAP, words_of
 
 _TRIED = "what is off the costmap is no valid trajectory (costmap_model.cpp; dwb_critics, map_grid.cpp)"
@@ -36,7 +36,7 @@ def window(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if reader.is_off("rolling_window"):
             text = "rolling_window of the local costmap is off: the robot drives out of it."
             entry = reader.values["rolling_window"]
-            yield warning("cannot-work", file, entry, text, "Switch it on.", "the window stays where it began")
+            yield file.warning("cannot-work", entry, text, "Switch it on.", "the window stays where it began")
         sides = [one for name in ("width", "height") if (one := reader.values.get(name)) is not None and one.number]
         for reach in _reaches(held, reader) if sides else ():
             side = (max if reach.is_either else min)(sides, key=lambda one: one.number or 0.0)
@@ -46,7 +46,7 @@ def window(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                     f"({reach.far_m:.3g} m)."
                 )
                 hint = f"Make it more than {2 * reach.far_m:.3g} m{_or_less(reach)}."
-                yield warning("hinders", file, side, text, hint, reach.source, reach.others)
+                yield file.warning("hinders", side, text, hint, reach.source, reach.others)
 
 
 def _or_less(reach: Reach) -> str:

@@ -24,7 +24,6 @@ from care_core.lint.readers import (
     Reader,
     Readers,
     readers,
-    warning,
 )
 from care_core.lint.scopes import COSTMAP, Scoped, words_of
 
@@ -170,7 +169,7 @@ def _above(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
                 text = f"{entry.keys[-1]} is {entry.number:g}: {rule.why}."
                 side = {1: "above", -1: "below", 0: "other than"}[rule.sign]
                 hint = f"It must be 0 or {side} it." if rule.zero else f"It must be {side} 0."
-                yield warning(rule.rule, file, entry, text, hint, rule.source)
+                yield file.warning(rule.rule, entry, text, hint, rule.source)
 
 
 def _is_of_source(key: str) -> bool:
@@ -184,7 +183,7 @@ def _off(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
             entry = reader.values[rule.name]
             text = f"{rule.name} of {reader.owners[0]} is off: {rule.why}."
             hint = f"Switch it on{f', unless {rule.unless}' if rule.unless else ''}."
-            yield warning(rule.rule, file, entry, text, hint, rule.source)
+            yield file.warning(rule.rule, entry, text, hint, rule.source)
 
 
 # Several values beside each other
@@ -204,7 +203,7 @@ def _simulated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         if entry is not None and entry.number and rate is not None and 0 < entry.number * (rate.number or 0) < 1:
             text = f"sim_time ({entry.number:g} s) is shorter than a step of controller_frequency ({rate.number:g} Hz)."
             hint = "The robot drives on past what was tried out: raise the rate or sim_time."
-            yield warning("contradiction", file, entry, text, hint, "the trajectory generators", [rate])
+            yield file.warning("contradiction", entry, text, hint, "the trajectory generators", [rate])
 
 
 def _predicted(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -219,7 +218,7 @@ def _predicted(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 "MPPI does not start."
             )
             hint = f"Make it {math.ceil(1e4 / hz) / 1e4:g}."
-            yield warning("cannot-work", file, entry, text, hint, "optimizer.cpp, setOffset", [rate])
+            yield file.warning("cannot-work", entry, text, hint, "optimizer.cpp, setOffset", [rate])
 
 
 def _considered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -234,7 +233,7 @@ def _considered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                     f"{'.'.join(switch.keys[-2:])} is on, and the local costmap has no footprint: MPPI does not start."
                 )
                 hint = "Give the costmap a footprint, or switch it off."
-                yield warning("cannot-work", file, switch, text, hint, "cost_critic.cpp, obstacles_critic.cpp")
+                yield file.warning("cannot-work", switch, text, hint, "cost_critic.cpp, obstacles_critic.cpp")
 
 
 def _weights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -246,7 +245,7 @@ def _weights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             if entry is not None and entry.number is not None and not 0 <= entry.number <= 1:
                 text = f"{name} is {entry.number:g}, and it is a share of what the laser sees, from 0 to 1."
                 hint = "z_hit, z_short, z_max and z_rand make 1 together."
-                yield warning("out-of-range", file, entry, text, hint, "the laser models of amcl weigh by it")
+                yield file.warning("out-of-range", entry, text, hint, "the laser models of amcl weigh by it")
 
 
 def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -264,7 +263,7 @@ def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 f"({step:.2g} rad: {slowest.keys[-1]} {slowest.number:g} at {rate.number:g} Hz)."
             )
             source = "latched_stop_rotate_controller.cpp turns no slower"
-            yield warning("contradiction", file, entry, text, "The robot turns to and fro.", source, [slowest, rate])
+            yield file.warning("contradiction", entry, text, "The robot turns to and fro.", source, [slowest, rate])
 
 
 def _starts(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -284,7 +283,7 @@ def _starts(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             )
             source = "simple_trajectory_generator.cpp: only speeds that a step reaches, and none below both"
             others = [one for one in every if one is not None and one is not ahead]
-            yield warning("contradiction", file, ahead, text, "Raise them or lower the least speeds.", source, others)
+            yield file.warning("contradiction", ahead, text, "Raise them or lower the least speeds.", source, others)
 
 
 def _progress(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -304,7 +303,7 @@ def _progress(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 f"is {speed:g}: every drive counts as stuck."
             )
             others = [reader.values[way], top]
-            yield warning("contradiction", file, reader.values[time], text, "Give it more time.", source, others)
+            yield file.warning("contradiction", reader.values[time], text, "Give it more time.", source, others)
 
 
 def _cells(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -318,17 +317,17 @@ def _cells(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             continue
         if cell.number <= 0:
             text = f"resolution is {cell.number:g}: the costmap has no cells."
-            yield warning("cannot-work", file, cell, text, "It must be above 0.", "costmap_2d")
+            yield file.warning("cannot-work", cell, text, "It must be above 0.", "costmap_2d")
         elif radius is not None and cell.number > radius > 0:
             text = f"resolution ({cell.number:g} m) is coarser than the robot's inscribed radius ({radius:.3g} m)."
-            yield warning("hinders", file, cell, text, "Ways through are closed: make cells smaller.", "costmap_2d")
+            yield file.warning("hinders", cell, text, "Ways through are closed: make cells smaller.", "costmap_2d")
     cell = held.one((COSTMAP,), ("resolution",))
     for reader in held.of(*PLANNERS, *CHECKERS):
         entry = reader.values.get("xy_goal_tolerance")
         if cell is not None and cell.number and entry is not None and entry.number and 0 < entry.number < cell.number:
             text = f"xy_goal_tolerance ({entry.number:g} m) is finer than a cell of the costmap ({cell.number:g} m)."
             hint = "The robot circles about its goal: give it more."
-            yield warning("hinders", file, entry, text, hint, _TOLERANCE, [cell])
+            yield file.warning("hinders", entry, text, hint, _TOLERANCE, [cell])
 
 
 def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -342,8 +341,8 @@ def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         padding = reader.values.get("footprint_padding")
         if radius and padding is not None and padding.number is not None and padding.number > radius:
             text = f"footprint_padding ({padding.number:g} m) is more than the robot itself ({radius:.3g} m)."
-            yield warning(
-                "contradiction", file, padding, text, "It closes narrow ways.", "costmap_2d pads each side by it"
+            yield file.warning(
+                "contradiction", padding, text, "It closes narrow ways.", "costmap_2d pads each side by it"
             )
     for one, other in combinations(sized, 2):
         (small, _), (large, entry) = sorted((one, other), key=lambda pair: pair[0])
@@ -351,7 +350,7 @@ def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             text = f"The robot has an inscribed radius of {large:.3g} m in one costmap and {small:.3g} m in the other."
             others = [pair[1] for pair in (one, other) if pair[1] is not entry]
             source = "both planners have to keep the same robot clear"
-            yield warning("contradiction", file, entry, text, "Give both the same.", source, others)
+            yield file.warning("contradiction", entry, text, "Give both the same.", source, others)
 
 
 def _goal_checks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -366,7 +365,7 @@ def _goal_checks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 f"({least:g} m): it stops to turn before it has arrived."
             )
             hint = "Give both the same."
-            yield warning("contradiction", file, checker, text, hint, "dwb_critics, rotate_to_goal.cpp", [entry])
+            yield file.warning("contradiction", checker, text, hint, "dwb_critics, rotate_to_goal.cpp", [entry])
 
 
 def _unknown_space(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -382,7 +381,7 @@ def _unknown_space(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         entry = planner.values["allow_unknown"]
         text = "allow_unknown is off, and the global costmap has no map: where nothing was seen there is no plan."
         others = [costmap.values["plugins"]]
-        yield warning("contradiction", file, entry, text, "Allow it.", "the planners keep to known cells", others)
+        yield file.warning("contradiction", entry, text, "Allow it.", "the planners keep to known cells", others)
 
 
 def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -392,7 +391,7 @@ def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         entries = [one for name in names if (one := reader.first((name, name.replace("tance_bias", "t_scale"))))]
         if len(entries) == len(names) and not any(one.number for one in entries):
             text = "goal_distance_bias and path_distance_bias are 0: nothing draws the robot to its goal."
-            yield warning("cannot-work", file, entries[0], text, "Raise them.", "dwa_planner.cpp", entries[1:])
+            yield file.warning("cannot-work", entries[0], text, "Raise them.", "dwa_planner.cpp", entries[1:])
 
 
 def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
@@ -403,7 +402,7 @@ def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
     for entry in off if on and len(off) <= len(on) else on if off else ():
         text = f"use_sim_time is {entry.value} here and not for {len(entries) - min(len(off), len(on))} other nodes."
         source = "nodes on two clocks drop each other's transforms"
-        yield warning("contradiction", file, entry, text, "Give all the same.", source)
+        yield file.warning("contradiction", entry, text, "Give all the same.", source)
 
 
 RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
