@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.dictionary import Dictionary, Field, find_field, find_message
@@ -17,6 +17,9 @@ from care_core.logs.base import Channel, Log, Table, Wanted, merge_needs
 from care_core.logs.formats import LogFormat
 from care_core.records import Record, field
 from care_core.run import Robot, Setting
+
+if TYPE_CHECKING:  # the app draws its first frame before anything needs numbers
+    from care_core.ecosystems.spans import Span
 
 
 class Limit(Record):
@@ -87,7 +90,7 @@ class RunModel:
         """Parameters that say what the software is put together from, as its messages tell them."""
         return {}
 
-    def repeats(self, channel: str) -> tuple[tuple[float, float], ...]:
+    def repeats(self, channel: str) -> tuple[Span, ...]:
         """Spans in which a source only repeats itself while the robot moves: it is frozen, and measures nothing."""
         return ()
 

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 from care_core.ecosystems.base import Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.timeline import Span, is_telemetry_rate, within
+from care_core.ecosystems.spans import Span, within
+from care_core.ecosystems.timeline import is_telemetry_rate
 from care_core.ecosystems.vehicles import Motor, is_self_written, switched_off
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
 from care_core.run import Setting, shown

@@ -11,13 +11,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from care_core.ecosystems.spans import Span, inside, seconds_in
 from care_core.numbers import Floats, ascending, median, quantile
 from care_core.records import Record
 from care_core.run import Unavailable
 from care_core.text import log_time
-
-Span = tuple[float, float]
-"""Start and end, in seconds from the start of the log."""
 
 _HOLE_PERIODS, _HOLE_S = 3.0, 2.0
 """A pause of more than both is a hole: memory cards stall for a second, radios lose two messages in a row."""
@@ -69,7 +67,7 @@ def doubt(samples: Samples) -> Unavailable | None:
     """Why a number that rests on these samples is none of its span; None where they cover it."""
     t = ascending(samples.t)
     usual_s = usual_pause(t)
-    total_s = sum(end - start for start, end in samples.spans)
+    total_s = seconds_in(samples.spans)
     missed_s = unseen(t, samples.spans, usual_s)
     if missed_s > samples.bears.of(total_s):
         seen_s = max(total_s - missed_s, 0.0)
@@ -113,14 +111,6 @@ def unseen(t: Floats, spans: Iterable[Span], usual_s: float) -> float:
         is_edge = np.isinf(before[holes]) | np.isinf(after[holes])
         missed_s += float(within[~is_edge | (within > limit_s)].sum())
     return missed_s
-
-
-def inside(spans: Iterable[Span], t: Floats) -> np.ndarray:
-    """Which times lie behind the beginning of one of the spans and not behind its end."""
-    found = np.zeros(len(t), dtype=bool)
-    for start, end in spans:
-        found |= (t > start) & (t <= end)
-    return found
 
 
 def _is_far(t: Floats, moment: float, usual_s: float) -> bool:

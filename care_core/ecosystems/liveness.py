@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Limits
-from care_core.ecosystems.coverage import Span, unseen, usual_pause
+from care_core.ecosystems.coverage import unseen, usual_pause
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
+from care_core.ecosystems.spans import Span, seconds_in, unbroken
 from care_core.numbers import Floats, ascending, distinct, quantile
 from care_core.records import Record
 
@@ -153,8 +154,7 @@ def numberless(t: Floats, columns: Sequence[NDArray[Any]], source: Live) -> Iter
     says_nothing = np.logical_or.reduce([~np.isfinite(column) for column in columns])
     if not says_nothing.any() or np.count_nonzero(~says_nothing) < source.records:
         return
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], says_nothing, [False])).astype(np.int8)))
-    for start, end in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+    for start, end in unbroken(says_nothing):
         if end - start + 1 >= source.records and t[end] - t[start] >= source.seconds:
             yield (float(t[start]), float(t[end])), end - start + 1
 
@@ -229,7 +229,7 @@ def recorded_in_part(sources: Mapping[str, Floats], spans: Sequence[Span]) -> It
         sources: when each was recorded, shape (n,), by its name.
         spans: when the vehicle was under way.
     """
-    total_s = sum(end - start for start, end in spans)
+    total_s = seconds_in(spans)
     parts = []
     for name, times in sources.items():
         t = ascending(times)

@@ -10,13 +10,12 @@ from itertools import pairwise
 import numpy as np
 
 from care_core.ecosystems.findings import Event
+from care_core.ecosystems.spans import Span, within
 from care_core.ecosystems.vehicles import is_self_written
 from care_core.logs.base import Table
 from care_core.numbers import Floats, ascending, distinct, median, pauses
 from care_core.run import Damage, Setting, shown
 from care_core.text import but_for_numbers, first_of, times_until
-
-Span = tuple[float, float]
 
 MOST = 40
 """Lines of a timeline; of a longer one the least telling are left out."""
@@ -145,11 +144,6 @@ def damage_of(damage: Sequence[Damage]) -> Iterator[Event]:
 def counted(number: int, what: str, plural: str = "s") -> str:
     """A number with its noun: "1 refusal", "2 switches"."""
     return f"{number} {what}{'' if number == 1 else plural}"
-
-
-def within(spans: Iterable[Span], t: float) -> bool:
-    """Whether a time lies in one of the spans."""
-    return any(start <= t <= end for start, end in spans)
 
 
 def _place(event: Event) -> tuple[bool, float, int]:

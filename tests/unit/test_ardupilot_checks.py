@@ -14,9 +14,9 @@ from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import expanded
-from care_core.ecosystems.ardupilot.spans import runs
 from care_core.ecosystems.findings import NO_BATTERY, Finding, every_finding
 from care_core.ecosystems.measures import Mission, find_extractor
+from care_core.ecosystems.spans import runs
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
 from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made, flight_of

@@ -16,9 +16,9 @@ import numpy as np
 from care_core.ecosystems.ardupilot import sources
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.recorded import UNKNOWN_MODE
-from care_core.ecosystems.ardupilot.spans import Span, during, parts, runs
+from care_core.ecosystems.ardupilot.statistics import parts
 from care_core.ecosystems.ardupilot.texts import mission_item
-from care_core.ecosystems.coverage import inside
+from care_core.ecosystems.spans import Span, during, inside, runs, within
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, pieces
@@ -326,7 +326,7 @@ class Airborne(Armed):
         blow at the end of a fast descent after which it rests. None where it did not."""
         said = ((t, text, _SIMULATED_HIT.match(text)) for t, text in self.messages)
         simulated = (Hit(t, float(match[1]), f"the simulator says: {text}") for t, text, match in said if match)
-        hits = [one for one in simulated if one.speed_ms > HIT_MS and any(a <= one.time_s <= b for a, b in self.armed)]
+        hits = [one for one in simulated if one.speed_ms > HIT_MS and within(self.armed, one.time_s)]
         return min((*hits, *self._struck_ground()), key=lambda hit: hit.time_s, default=None)
 
     def _struck_ground(self) -> Iterator[Hit]:
@@ -453,7 +453,7 @@ class Airborne(Armed):
             return None
         before = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost]
         just_before = (t for t, felt in before if felt > _SHOCK and t >= lost - _STRUCK_S)
-        flown = [(t, felt) for t, felt in before if any(start <= t <= end for start, end in self.airborne)]
+        flown = [(t, felt) for t, felt in before if within(self.airborne, t)]
         moved = self.one("GPS", "Spd")
         hard = (t for t, felt in flown if felt > _HARD * _SHOCK or _stops_at(moved, t))
         return min((*hard, *just_before), default=None)

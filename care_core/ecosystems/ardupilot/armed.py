@@ -10,7 +10,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.instances import FIX
 from care_core.ecosystems.ardupilot.recorded import Recorded
-from care_core.ecosystems.ardupilot.spans import Span, during, runs
+from care_core.ecosystems.spans import Span, during, runs
 from care_core.ecosystems.vehicles import method_words, unrecorded_changes
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from care_core.ecosystems.ardupilot.armed import Armed
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import smooth
+from care_core.ecosystems.spans import during
 from care_core.logs.base import Table
 from care_core.numbers import median, quantile
 from care_core.records import Record

@@ -17,9 +17,9 @@ from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M, FOLLOWED_DEG, Ai
 from care_core.ecosystems.ardupilot.battery import Battery
 from care_core.ecosystems.ardupilot.instances import FIX
 from care_core.ecosystems.ardupilot.one_run import OneRun, windows_of
-from care_core.ecosystems.ardupilot.spans import Span, during, runs
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.liveness import Frozen
+from care_core.ecosystems.spans import Span, during, runs
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import Bools, Floats
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from care_core.ecosystems.ardupilot.held_missions import READS as OF_MISSIONS
-from care_core.ecosystems.ardupilot.spans import Span
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.spans import Span
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record
 from care_core.run import Damage, Setting

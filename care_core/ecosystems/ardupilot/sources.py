@@ -14,9 +14,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.instances import FIX, instances, sees_nothing
 from care_core.ecosystems.ardupilot.messages import expanded
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.base import Limits
-from care_core.ecosystems.coverage import Span
 from care_core.ecosystems.findings import FindingKind
 from care_core.ecosystems.liveness import (
     ASIDE,
@@ -35,6 +33,7 @@ from care_core.ecosystems.liveness import (
     says_nothing,
     turned,
 )
+from care_core.ecosystems.spans import Span, during
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import Floats

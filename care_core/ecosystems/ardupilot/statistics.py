@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.spans import Span, runs
 from care_core.ecosystems.base import Limits
+from care_core.ecosystems.spans import Span, runs
+from care_core.logs.base import Table
 from care_core.numbers import Bools, Floats, median, pieces, quantile
 
 Calibration = Sequence[tuple[float, float]]
@@ -43,6 +44,11 @@ def lasting(t: Floats, mask: Bools, for_s: float, gap_s: float = 1.0, records: i
         for span, begin, end in zip(held, starts, counts[1::2], strict=True)
         if span[1] - span[0] >= for_s and end - begin >= records
     ]
+
+
+def parts(table: Table) -> Iterator[Table]:
+    """The messages piece by piece: of a long log no more than one piece of a column is decoded."""
+    return (table.where(rows) for rows in pieces(len(table)))
 
 
 def smooth(t: Floats, x: Floats, width_s: float) -> Floats:

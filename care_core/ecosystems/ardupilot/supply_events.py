@@ -8,8 +8,8 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.battery import Battery
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span
 from care_core.ecosystems.findings import Event
+from care_core.ecosystems.spans import Span
 from care_core.logs.base import Table
 
 _DEAD_V = 1.0

@@ -16,7 +16,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from care_core.ecosystems.ardupilot.armed import ArmChange
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.recorded import Mode
-from care_core.ecosystems.ardupilot.spans import Span
 from care_core.ecosystems.ardupilot.statistics import records
 from care_core.ecosystems.ardupilot.supply_events import supply_events
 from care_core.ecosystems.ardupilot.texts import (
@@ -26,15 +25,8 @@ from care_core.ecosystems.ardupilot.texts import (
     says_what_is_recorded,
 )
 from care_core.ecosystems.findings import Event
-from care_core.ecosystems.timeline import (
-    counted,
-    damage_of,
-    gaps,
-    parameter_changes,
-    repeats,
-    timeline_of,
-    within,
-)
+from care_core.ecosystems.spans import Span, within
+from care_core.ecosystems.timeline import counted, damage_of, gaps, parameter_changes, repeats, timeline_of
 from care_core.ecosystems.vehicles import (
     FAILSAFE,
     Vehicle,
@@ -210,10 +202,10 @@ def _flurries(changes: Sequence[Mode]) -> Iterator[list[Mode]]:
 def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
     """ERR records; one that is over again is one line with how long it lasted, and so is one that is said again."""
     rows = flight.error_records
-    lasted: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    lasted: dict[tuple[int, int], list[Span]] = {}
     lanes: list[tuple[float, int]] = []
     for at, (t, subsystem, code) in enumerate(rows):
-        if subsystem == _TERRAIN and not any(start <= t <= end for start, end in flight.armed):
+        if subsystem == _TERRAIN and not within(flight.armed, t):
             continue  # every start, until the map is loaded
         if subsystem == _EKF_PRIMARY:
             lanes.append((t, code))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from care_core.ecosystems.findings import Finding, FindingKind, Severity, SuspectKind
-from care_core.ecosystems.px4.flight import Px4Flight, Span
+from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.spans import Span, seconds_in, unbroken
 from care_core.logs.base import Table
 from care_core.numbers import Bools, Floats
 from care_core.records import Record
@@ -77,7 +76,7 @@ def episode(
     if not spans:
         return None
     start = spans[0][0]
-    lasts_s = sum(until - since for since, until in spans)
+    lasts_s = seconds_in(spans)
     lasting = (
         times_until(len(spans), spans[-1][0]) if len(spans) > 1
         else f" for {lasts_s:.1f} s" if lasts_s >= _SHORTEST_SHOWN_S
@@ -88,6 +87,4 @@ def episode(
 
 def _spans(t: Floats, mask: Bools) -> list[Span]:
     """Spans in which a mask holds, each until the next row in which it does not."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    ends = np.minimum(edges[1::2], len(t) - 1)
-    return list(zip(t[edges[::2]].tolist(), t[ends].tolist(), strict=True))
+    return [(float(t[first]), float(t[min(last + 1, len(t) - 1)])) for first, last in unbroken(mask)]

@@ -6,7 +6,8 @@ import re
 from typing import NamedTuple
 
 from care_core.ecosystems.base import Limits
-from care_core.ecosystems.px4.flight import Px4Flight, Span, is_complaint
+from care_core.ecosystems.px4.flight import Px4Flight, is_complaint
+from care_core.ecosystems.spans import Span
 
 LIMITS = Limits()
 OFTEN = LIMITS.add("errors alike", 20.0, "", "a choice: a part that recovers is complained of a few times")

@@ -20,10 +20,9 @@ from care_core.ecosystems.liveness import Frozen, Unconnected
 from care_core.ecosystems.px4 import sources
 from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED, Lean, lean_of
 from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
+from care_core.ecosystems.spans import Span, within
 from care_core.logs.base import Log, Table, Wanted
-from care_core.numbers import Bools, Floats
-
-Span = tuple[float, float]
+from care_core.numbers import Bools
 
 STATUS, MESSAGES, LANDED = "vehicle_status", "logged_messages", "vehicle_land_detected"
 POSITION, RESULT, FLAGS = "vehicle_local_position", "mission_result", "failsafe_flags"
@@ -155,7 +154,7 @@ class Px4Flight(RunModel):
     def kills(self) -> tuple[float, ...]:
         """When the kill switch cut its motors while it was armed, as the commander says."""
         said = (t for t, _, text in self.messages if _KILLED.search(text) and not is_complaint(text))
-        return tuple(t for t in said if any(start <= t <= end for start, end in self.armed))
+        return tuple(t for t in said if within(self.armed, t))
 
     def parameter(self, name: str) -> float | None:
         """The value of a parameter as first driven, None where the log does not hold it."""
@@ -193,12 +192,6 @@ class Px4Flight(RunModel):
         """Whether it never flew as a wing or drove."""
         table = self.table(STATUS, "vehicle_type")
         return table is None or bool(np.all(np.isin(table["vehicle_type"], (0, ROTARY))))
-
-    @staticmethod
-    def spans(t: Floats, mask: Bools) -> list[Span]:
-        """From the first to the last time of each run of a mask."""
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-        return list(zip(t[edges[::2]].tolist(), t[edges[1::2] - 1].tolist(), strict=True))
 
     @cached_property
     def aloft(self) -> tuple[Span, ...]:

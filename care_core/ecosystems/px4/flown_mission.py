@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from care_core.ecosystems.px4.flight import LANDED, RESULT, SAID_WITHIN_S, Px4Flight, Span, changes
+from care_core.ecosystems.px4.flight import LANDED, RESULT, SAID_WITHIN_S, Px4Flight, changes
+from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.run import Unavailable, Value
 from care_core.text import log_time

@@ -25,12 +25,12 @@ from care_core.ecosystems.px4.flight import (
     ROVER,
     STATUS,
     Px4Flight,
-    Span,
 )
 from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.px4.measures.flown import NEEDS, is_armed, span_of_phase
 from care_core.ecosystems.px4.measures.outcome import failsafe_s, flew_automatically, halted, lost_s
 from care_core.ecosystems.px4.measures.shortfall import evidence, shortfall
+from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.records import replace

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from care_core.ecosystems.base import Limits, RunModel
-from care_core.ecosystems.coverage import Span, inside
 from care_core.ecosystems.findings import FindingKind
 from care_core.ecosystems.liveness import (
     ASIDE,
@@ -25,6 +24,7 @@ from care_core.ecosystems.liveness import (
     says_nothing,
     turned,
 )
+from care_core.ecosystems.spans import Span, inside
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import Floats
 

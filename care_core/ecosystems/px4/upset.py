@@ -10,6 +10,7 @@ import numpy as np
 from care_core.ecosystems.base import Limits
 from care_core.ecosystems.px4 import attitude
 from care_core.ecosystems.px4.flight import LANDED, POSITION, ROTARY, STATUS, Px4Flight
+from care_core.ecosystems.spans import runs
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import Bools
 
@@ -82,7 +83,7 @@ def _dropped(flight: Px4Flight) -> Hit | None:
         if heights is None or position is None or not flight.hovers:
             continue
         vz = np.interp(heights.t, position.t, np.nan_to_num(position["vz"]))
-        for begin, over in flight.spans(heights.t, vz > _HIT_MS):
+        for begin, over in runs(heights.t, vz > _HIT_MS):
             before = heights.between(begin - _FALLS_S, over)["height"]
             after = heights.between(over + _FALLS_S, over + _FALLS_S + _LIES_S)
             if len(after) < 3 or after.t[-1] - after.t[0] < _LIES_S / 2 or over + _LIES_S > end:
@@ -134,7 +135,7 @@ def falls_after(flight: Px4Flight, cut_s: float) -> bool | None:
     if soon is None or len(soon) < 3 * _CUT_S / _FALL_S:
         return None
     force = np.sqrt(sum(soon[name] ** 2 for name in FORCES))
-    return any(end - start >= _FALL_S for start, end in flight.spans(soon.t, force < _FALLING))
+    return any(end - start >= _FALL_S for start, end in runs(soon.t, force < _FALLING))
 
 
 def leans_over_deg(flight: Px4Flight, cut_s: float) -> float | None:
@@ -154,7 +155,7 @@ def lost_control(flight: Px4Flight) -> Lost | None:
     if not np.isfinite(lean.error_deg).any():
         off = lean.tilt_deg > _TIPPED_DEG
     impact = hit(flight)
-    for start, end in flight.spans(lean.t, off):
+    for start, end in runs(lean.t, off):
         falls = impact is not None and start <= impact.time_s <= end + _ENDED_S
         stays = _stays(flight, lean, end, impact.time_s if falls and impact is not None else math.inf)
         if not is_aloft(flight, start) or not stays or not (falls or end - start >= _LASTS_S):
@@ -186,4 +187,4 @@ def _stays(flight: Px4Flight, lean: attitude.Lean, since: float, hit_s: float) -
     until = min(next((end for start, end in flight.armed if start <= since <= end), since), hit_s)
     held: Bools = (lean.error_deg < _HELD_DEG) & (lean.t > since) & (lean.t <= until)
     enough_s = _BACK_S if hit_s == math.inf else _CAUGHT_S
-    return not any(end - start > enough_s for start, end in flight.spans(lean.t, held))
+    return not any(end - start > enough_s for start, end in runs(lean.t, held))

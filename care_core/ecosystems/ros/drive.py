@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from care_core.ecosystems.base import RunModel
-from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Severity
 from care_core.ecosystems.liveness import Frozen, is_part
 from care_core.ecosystems.plausible import STAMP
@@ -51,6 +50,7 @@ from care_core.ecosystems.ros.plugin_names import created
 from care_core.ecosystems.ros.posed_goals import posed_goals, section_of
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
 from care_core.ecosystems.ros.shown_tilt import shown_tilts
+from care_core.ecosystems.spans import Span, inside
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
 from care_core.numbers import Floats, median, quantile
 from care_core.records import Record
@@ -126,7 +126,7 @@ class Drive(RunModel):
         self._looked_at: Wanted = {}
         self._samples: dict[str, Table] = {}
         self._prepared: dict[tuple[Prepare[Any], str], Any] = {}
-        self._repeats: dict[str, tuple[tuple[float, float], ...]] = {}
+        self._repeats: dict[str, tuple[Span, ...]] = {}
 
     # The recording
 
@@ -315,7 +315,7 @@ class Drive(RunModel):
         tables = {topic: table for kind in sources.TYPES for topic, table in self.of(kind)}
         return tuple(one for topic, table in tables.items() for one in self._frozen(topic, table, tables))
 
-    def repeats(self, channel: str) -> tuple[tuple[float, float], ...]:
+    def repeats(self, channel: str) -> tuple[Span, ...]:
         """As the base says; of every message of the topics that were read whole."""
         if channel not in self._repeats:
             tables = {**self._samples, **self._tables}
@@ -324,7 +324,7 @@ class Drive(RunModel):
             self._repeats[channel] = tuple(one.span for one in found)
         return self._repeats[channel]
 
-    def _dead(self, topic: str) -> list[tuple[float, float]]:
+    def _dead(self, topic: str) -> list[Span]:
         """Where a topic only repeats itself, by its samples."""
         return [one.span for one in self.frozen if one.channel == topic]
 
@@ -350,7 +350,7 @@ class Drive(RunModel):
         return tuple(one.name for one in self.channels if one.count and bumpers.is_bumper(one))
 
     @cached_property
-    def bumps(self) -> tuple[tuple[float, float], ...]:
+    def bumps(self) -> tuple[Span, ...]:
         """From when to when a bumper was pressed, by what its messages say."""
         tables = [self._samples[name] for name in self.bumper_topics if name in self._samples]
         return tuple(sorted(span for table in tables for span in bumpers.contacts(table, self.duration_s)))

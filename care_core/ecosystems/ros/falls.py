@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from care_core.ecosystems.spans import unbroken
 from care_core.numbers import Floats
 from care_core.records import Record
 
@@ -51,8 +52,7 @@ def fall_of(topic: str, t: Floats, tilt: Floats, z: Floats, path_m: Callable[[fl
 
 def _tipped(topic: str, t: Floats, tilt: Floats, z: Floats, path_m: Callable[[float, float], float]) -> Fall | None:
     over = tilt > TIPPED_DEG
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], over, [False])).astype(np.int8)))
-    for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+    for first, last in unbroken(over):
         if t[last] - t[first] < LIES_S:
             continue
         level = np.flatnonzero(tilt[:first] < LEVEL_DEG)

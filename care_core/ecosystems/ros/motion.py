@@ -364,14 +364,3 @@ def moved_to(poses: Poses, t: Floats, x: Floats, y: Floats, yaw: Floats) -> tupl
         poses.y[at] + np.sin(off) * dx + np.cos(off) * dy,
         yaw + off,
     )
-
-
-def stretches(t: Floats, condition: Bools, gap_s: float) -> list[tuple[float, float]]:
-    """First and last time of each stretch in which a condition holds, breaks shorter than `gap_s` bridged."""
-    found: list[tuple[float, float]] = []
-    for time_s in t[condition].tolist():
-        if found and time_s - found[-1][1] < gap_s:
-            found[-1] = (found[-1][0], time_s)
-        else:
-            found.append((time_s, time_s))
-    return found

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from care_core.ecosystems.base import Limits
-from care_core.ecosystems.coverage import Span
 from care_core.ecosystems.liveness import ASIDE, Frozen, Live, Motion, least, numberless, ranged, repeats, turned
 from care_core.ecosystems.ros.messages import (
     BATTERY,
@@ -24,6 +23,7 @@ from care_core.ecosystems.ros.messages import (
     TWIST_STAMPED,
     yaw_of,
 )
+from care_core.ecosystems.spans import Span
 from care_core.logs.base import Table
 from care_core.numbers import Floats
 

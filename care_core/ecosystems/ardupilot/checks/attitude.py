@@ -15,10 +15,10 @@ import numpy as np
 from care_core.ecosystems.ardupilot.airborne import ACRO, UPSIDE_DOWN_DEG
 from care_core.ecosystems.ardupilot.checks.thrust import saturated
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
-from care_core.ecosystems.ardupilot.spans import Span, during, parts
-from care_core.ecosystems.ardupilot.statistics import lasting, means, records, top
+from care_core.ecosystems.ardupilot.statistics import lasting, means, parts, records, top
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median
 

@@ -13,18 +13,18 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import parts
 from care_core.ecosystems.ardupilot.statistics import (
     aligned,
     calibrated,
     calibrated_probability,
     lasting,
+    parts,
     roughness,
     smooth,
 )
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.spans import inside
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, quantile

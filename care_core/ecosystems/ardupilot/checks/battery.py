@@ -15,10 +15,10 @@ from care_core.ecosystems.ardupilot import sources
 from care_core.ecosystems.ardupilot.battery import Battery, within_reason
 from care_core.ecosystems.ardupilot.checks.settings import supply
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import BATTERY_FAILSAFE, NO_BATTERY, OWN_SUPPLY, SAGS, UNCHARGED, Finding, Severity
+from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, known_median, median
 from care_core.text import log_time

@@ -14,10 +14,10 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.checks.settings import outputs
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during, seconds_in
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 
@@ -69,7 +69,7 @@ def _held(flight: Flight) -> Iterator[Finding]:
         start, end = flight.held[0][0], flight.held[-1][1]
         t, tilt = flight.tilt
         lean = float(median(tilt[during(flight.held, t)]))
-        lasted = sum(b - a for a, b in flight.held)
+        lasted = seconds_in(flight.held)
         blow = ", after an impact" if flight.first_blow_s < start else ""
         yield Finding(
             kind="blocked",

@@ -16,7 +16,6 @@ import numpy as np
 from care_core.ecosystems.ardupilot.checks.refused_by import refusing
 from care_core.ecosystems.ardupilot.checks.settings import heading
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import (
     aligned,
     calibrated,
@@ -28,6 +27,7 @@ from care_core.ecosystems.ardupilot.statistics import (
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.liveness import says_nothing
+from care_core.ecosystems.spans import during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, known_median, median, quantile
 

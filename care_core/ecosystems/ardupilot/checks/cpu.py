@@ -12,10 +12,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during, within
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"PM": ("NLon", "NL", "Load")}
@@ -33,7 +33,7 @@ _FAILSAFE_CPU = 19
 
 def find(flight: Flight) -> Iterator[Finding]:
     """Overload while armed."""
-    stuck = [t for t, code in flight.errors(_FAILSAFE_CPU) if code and any(a <= t <= b for a, b in flight.armed)]
+    stuck = [t for t, code in flight.errors(_FAILSAFE_CPU) if code and within(flight.armed, t)]
     if stuck:
         yield Finding(
             kind="cpu",

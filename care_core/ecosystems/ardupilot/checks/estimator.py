@@ -12,10 +12,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.spans import during, within
 from care_core.logs.base import Wanted
 from care_core.text import log_time
 
@@ -79,7 +79,7 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _inside(flight: Flight, times: list[float]) -> list[float]:
-    return sorted(t for t in times if any(start <= t <= end for start, end in flight.flown))
+    return sorted(t for t in times if within(flight.flown, t))
 
 
 CHECK = Check("estimator", "test ratios over their limit, failsafes, changes of lane", READS, LIMITS, find)

@@ -13,11 +13,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.spans import during, inside, seconds_in, within
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, quantile
@@ -173,7 +172,7 @@ def _severity(flight: Flight, start: float, is_large: bool) -> Severity:
 
 def _reported(flight: Flight) -> Iterator[Finding]:
     """Glitches and losses as the firmware counted them."""
-    inside = [(t, code) for t, code in flight.errors(_ERR_GPS) if code == _GLITCH and _in(flight.flown, t)]
+    inside = [(t, code) for t, code in flight.errors(_ERR_GPS) if code == _GLITCH and within(flight.flown, t)]
     if inside:
         cleared = [t for t, code in flight.errors(_ERR_GPS) if code == 0 and t > inside[0][0]]
         yield Finding(
@@ -188,10 +187,6 @@ def _reported(flight: Flight) -> Iterator[Finding]:
         )
 
 
-def _in(spans: tuple[Span, ...], t: float) -> bool:
-    return any(start <= t <= end for start, end in spans)
-
-
 def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
     """A fix that went away in the air, or of what drove: a vehicle that stands under a roof has nowhere to go."""
     if not flies(flight.kind) and not _drove(flight):
@@ -200,7 +195,7 @@ def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
     out = lasting(table.t, had & (table["Status"] < _FIX) & during(flight.flown, table.t), _NO_FIX_S, records=2)
     if out:
         start = out[0][0]
-        total = sum(b - a for a, b in out)
+        total = seconds_in(out)
         severity: Severity = "critical" if total > _LONG_S and not flight.all("GPS")[1:] else "warning"
         yield Finding(
             kind="gps",

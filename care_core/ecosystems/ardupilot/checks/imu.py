@@ -15,7 +15,6 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.checks.settings import level
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import (
     aligned,
     calibrated,
@@ -28,6 +27,7 @@ from care_core.ecosystems.ardupilot.statistics import (
 )
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.spans import Span, during, seconds_in
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, quantile
 
@@ -109,7 +109,7 @@ def _unhealthy(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
                     onset_s=spans[0][0],
                     end_s=spans[-1][1],
                     severity="critical",
-                    evidence=f"{name} {n} is marked unhealthy for {sum(b - a for a, b in spans):.1f} s",
+                    evidence=f"{name} {n} is marked unhealthy for {seconds_in(spans):.1f} s",
                     source=f"IMU.{flag}",
                     probability=_FAILED,
                 )

@@ -9,6 +9,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import STOPPED, Finding
+from care_core.ecosystems.spans import within
 from care_core.logs.base import Wanted
 
 _CHANNELS = range(5, 15)
@@ -28,7 +29,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     if not (flight.is_copter or flight.kind == "quadplane"):
         return
     thrown = sorted((*flight.events(_STOPPED), *_switched(flight)))
-    stopped_s = next((t for t in thrown if any(start <= t <= end for start, end in flight.airborne)), None)
+    stopped_s = next((t for t in thrown if within(flight.airborne, t)), None)
     height_m = None if stopped_s is None or flight.height is None else float(np.interp(stopped_s, *flight.height))
     if stopped_s is not None and (height_m is None or (height_m > _ALOFT_M and _falls(flight, stopped_s))):
         yield Finding(

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import within
 from care_core.logs.base import Wanted
 from care_core.text import log_time
 
@@ -23,7 +24,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     told = [t for t, code in flight.errors(_LEAK) if code > 0]
     told += [t for t, text in flight.messages if text.casefold().startswith("leak detected")]
-    since = min((t for t in told if any(start <= t <= end for start, end in flight.watched)), default=None)
+    since = min((t for t in told if within(flight.watched, t)), default=None)
     if since is None:
         return
     yield Finding(

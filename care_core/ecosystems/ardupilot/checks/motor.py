@@ -18,11 +18,11 @@ from care_core.ecosystems import lost_motor
 from care_core.ecosystems.ardupilot.checks import bench
 from care_core.ecosystems.ardupilot.checks.thrust import climbs, saturated
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, means, records
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.lost_motor import Commands, driven_hardest
+from care_core.ecosystems.spans import during, within
 from care_core.ecosystems.vehicles import Motor, motors_of
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, pieces, quantile
@@ -419,7 +419,7 @@ def _reported(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     much, as when it turns against its will, neither is weak."""
     for t, text in flight.messages:
         match = _THRUST_LOSS.search(text)
-        if match and any(start <= t <= end for start, end in flight.armed):
+        if match and within(flight.armed, t):
             motor = next((one for one in outputs.motors if one.number == int(match[1])), None)
             near = np.abs(outputs.t - t) < 5.0
             excess = median(_joined(_excess(outputs, near)), axis=1) if near.any() else np.zeros(len(outputs.motors))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.spans import within
 from care_core.logs.base import Wanted
 from care_core.text import log_time
 
@@ -28,7 +29,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         gone = [t for t, code in told if code > 0]
         gone += [t for t, text in flight.messages if text.casefold().startswith(_WORDS[subsystem]) and
                  "clear" not in text.casefold()]  # fmt: skip
-        gone = sorted(t for t in gone if any(start <= t <= end for start, end in flight.watched))
+        gone = sorted(t for t in gone if within(flight.watched, t))
         if not gone:
             continue
         back = [t for t, code in told if code == 0 and t > gone[0]]

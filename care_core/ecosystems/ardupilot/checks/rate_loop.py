@@ -10,9 +10,9 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.checks.attitude import swings
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during
 from care_core.logs.base import Wanted
 from care_core.numbers import Floats, median
 from care_core.run import shown

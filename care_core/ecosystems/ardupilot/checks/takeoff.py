@@ -14,9 +14,9 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.airborne import ACRO
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during, runs
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import Span, during, runs
 from care_core.ecosystems.vehicles import motor_outputs
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, median

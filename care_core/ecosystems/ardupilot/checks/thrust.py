@@ -13,10 +13,10 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.checks.settings import hover
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
+from care_core.ecosystems.spans import Span, during, seconds_in
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 from care_core.text import log_time
@@ -63,7 +63,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         below = _below(flight, start, end)
         begin = min([start, *[a for a, _ in high]])
         before = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
-        lasted = sum(b - a for a, b in full)
+        lasted = seconds_in(full)
         grounded = not flight.flown and lasted > _GROUNDED_S
         lost = flight.impact_s is not None or any(code for _, code in flight.errors(_FAILSAFE_BATT))
         severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
@@ -86,7 +86,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             parameters=behind.parameters,
             wanted=behind.wanted,
         )
-    elif high and sum(b - a for a, b in high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
+    elif high and seconds_in(high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
         share = float(median(level[flown]))
         behind = _behind(flight)
         yield Finding(

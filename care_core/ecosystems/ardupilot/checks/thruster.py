@@ -13,10 +13,10 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.airborne import UPSIDE_DOWN_DEG
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during, seconds_in
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 
@@ -91,7 +91,7 @@ def _fought(flight: Flight) -> Iterator[Finding]:
         end_s=spans[-1][1],
         severity="warning",
         evidence=(
-            f"{100 * took:.0f} % of its control of the {named} for {sum(b - a for a, b in spans):.0f} s, with no turn "
+            f"{100 * took:.0f} % of its control of the {named} for {seconds_in(spans):.0f} s, with no turn "
             f"asked for (limit {100 * limit:.0f} %)"
         ),
         source="RATE.ROut, YOut; ATT.DesRoll, DesYaw",

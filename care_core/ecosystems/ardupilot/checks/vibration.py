@@ -13,7 +13,6 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import (
     calibrated,
     calibrated_probability,
@@ -26,6 +25,7 @@ from care_core.ecosystems.ardupilot.statistics import (
 )
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.spans import during, seconds_in
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, quantile
 
@@ -108,7 +108,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
     peak = top(level[(t >= start) & (t <= end)], 0.9)
     severity = _severity(flight, peak, clips, any(at >= start - 1 for at in upset), before < peak / _TIMES)
     rose = f", from {before:.1f}" if before < peak / _TIMES else ""
-    lasted = sum(b - a for a, b in spans) if spans else end - start
+    lasted = seconds_in(spans) if spans else end - start
     clipping = f"; {clips:.0f} clips of the accelerometer's range" if clips else ""
     return Finding(
         kind="vibration",

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, runs
 from care_core.ecosystems.ardupilot.statistics import smooth
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import Span, runs, seconds_in
 from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats, quantile
 
@@ -92,7 +92,7 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _told(flight: Flight, phase: _Slow) -> Iterator[Finding]:
-    flown = sum(end - start for start, end in flight.armed)
+    flown = seconds_in(flight.armed)
     share = phase.costs_s / max(flown - phase.costs_s, 1.0)
     value, default = flight.setting(phase.parameter), _default(flight, phase.parameter)
     least = _SHARE if flight.battery_failsafe_s is None else _SHARE_CUT_SHORT

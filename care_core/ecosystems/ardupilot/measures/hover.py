@@ -19,6 +19,7 @@ from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS
 from care_core.ecosystems.ardupilot.measures.winged import legs_flown
 from care_core.ecosystems.coverage import USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
+from care_core.ecosystems.spans import seconds_in
 from care_core.ecosystems.statistic import statistic
 from care_core.logs.base import Table, merge_needs
 from care_core.numbers import Floats, median
@@ -120,7 +121,7 @@ def assisted(mission: Mission, args: Args) -> Value:
     if table is None or len(table) < MIN_ROWS:
         return missing("RATE")
     helped = sum(((table.t >= start) & (table.t <= end)).sum() for start, end in spans)
-    return float(min(helped * median(np.diff(table.t)) / sum(end - start for start, end in spans), 1.0))
+    return float(min(helped * median(np.diff(table.t)) / seconds_in(spans), 1.0))
 
 
 @extractor("landing_time", needs=NEEDS, unit="s", rests_on=rests.heights_of_phase)

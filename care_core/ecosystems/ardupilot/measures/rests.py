@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
 from care_core.ecosystems.ardupilot.measures.phases import span_of_phase
 from care_core.ecosystems.ardupilot.measures.samples import samples, whole
-from care_core.ecosystems.coverage import EXTREME, MEAN, SUM, USUAL, Bears, Samples, Span
+from care_core.ecosystems.coverage import EXTREME, MEAN, SUM, USUAL, Bears, Samples
 from care_core.ecosystems.measures import Args, Mission, RestsOn
+from care_core.ecosystems.spans import Span
 from care_core.run import Unavailable
 
 _OF_STAT = {"max": EXTREME, "min": EXTREME}

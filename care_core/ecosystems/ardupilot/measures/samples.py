@@ -9,9 +9,10 @@ import numpy as np
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures.modes import flight_of
 from care_core.ecosystems.ardupilot.messages import MESSAGES
-from care_core.ecosystems.coverage import SUM, Bears, Samples, Span, doubt
+from care_core.ecosystems.coverage import SUM, Bears, Samples, doubt
 from care_core.ecosystems.dictionary import Message
 from care_core.ecosystems.measures import Args, Mission
+from care_core.ecosystems.spans import Span
 from care_core.logs.base import Table
 from care_core.numbers import Floats
 from care_core.run import Unavailable

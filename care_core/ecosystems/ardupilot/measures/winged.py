@@ -36,8 +36,9 @@ from care_core.ecosystems.ardupilot.measures.requested import (
 )
 from care_core.ecosystems.ardupilot.measures.samples import samples
 from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS
-from care_core.ecosystems.coverage import EXTREME, USUAL, Samples, Span
+from care_core.ecosystems.coverage import EXTREME, USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, missing, numeric, one_of
+from care_core.ecosystems.spans import Span, during, seconds_in
 from care_core.ecosystems.statistic import statistic
 from care_core.ecosystems.vehicles.way import distance_to_legs
 from care_core.logs.base import Table, Wanted, merge_needs
@@ -195,7 +196,7 @@ def on_legs(mission: Mission, channel: str, *fields: str) -> Table | Unavailable
         return missing(channel)
     table = next(iter(split(channel, table)), table)
     wanted = np.logical_and.reduce([np.isfinite(table[field]) for field in fields])
-    wanted &= np.logical_or.reduce([(table.t >= start) & (table.t <= end) for start, end in spans])
+    wanted &= during(spans, table.t)
     rows = table.where(wanted)
     return rows if len(rows) >= MIN_ROWS else Unavailable(f"too little {channel} on the legs")
 
@@ -308,7 +309,7 @@ def leg_speed(mission: Mission, args: Args) -> Value:
     legs = mission.shared(legs_of)
     if isinstance(legs, Unavailable):
         return legs
-    flown_s = sum(end - start for start, end in legs.spans.values())
+    flown_s = seconds_in(legs.spans.values())
     if flown_s <= 0:
         return Unavailable("the flight completed no leg after the first")
     return sum(legs.legs[index].length for index in legs.spans) / flown_s

@@ -9,7 +9,8 @@ import numpy as np
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4 import upset
-from care_core.ecosystems.px4.flight import Px4Flight, Span
+from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.spans import Span, runs, seconds_in
 from care_core.logs.base import Wanted
 
 READS: Wanted = upset.READS
@@ -25,8 +26,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     if lean is None or lost is not None or not flight.hovers:
         return
     off = np.nan_to_num(lean.error_deg) > upset.LEFT_DEG
-    spans = [span for span in flight.spans(lean.t, off) if upset.is_aloft(flight, span[0])]
-    left = next((together for together in _groups(spans) if sum(b - a for a, b in together) >= _LASTS_S), None)
+    spans = [span for span in runs(lean.t, off) if upset.is_aloft(flight, span[0])]
+    left = next((together for together in _groups(spans) if seconds_in(together) >= _LASTS_S), None)
     if left is None:
         return
     start, end = left[0][0], left[-1][1]

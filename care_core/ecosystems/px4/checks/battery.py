@@ -9,7 +9,8 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import UNCHARGED, Finding
-from care_core.ecosystems.px4.flight import Px4Flight, Span
+from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles.settings import code
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median

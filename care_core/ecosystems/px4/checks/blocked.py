@@ -10,6 +10,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.errors import most_repeated
 from care_core.ecosystems.px4.flight import MESSAGES, POSITION, ROVER, STATUS, Px4Flight
+from care_core.ecosystems.spans import runs
 from care_core.logs.base import Wanted
 
 _MOTORS, _MOST = "actuator_motors", 4
@@ -36,7 +37,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     with np.errstate(divide="ignore", invalid="ignore"):  # damage gives records one time
         turn = np.abs(np.degrees(np.gradient(np.unwrap(np.nan_to_num(moved["heading"])), moved.t)))
     stands = (speed < _STANDS_MS) & (turn < _TURNS_DPS) & (np.interp(moved.t, motors.t, driven) > _DRIVEN)
-    for start, end in flight.spans(moved.t, stands):
+    for start, end in runs(moved.t, stands):
         drives = flight.last(STATUS, "vehicle_type", start) == ROVER
         if drives and end - start >= _LASTS_S and any(a <= start and end <= b for a, b in flight.armed):
             yield _stood(flight, start, end, float(driven[(motors.t >= start) & (motors.t <= end)].max()))

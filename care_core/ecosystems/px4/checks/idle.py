@@ -12,7 +12,8 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import NOT_BEGUN, Finding
-from care_core.ecosystems.px4.flight import LANDED, RESULT, Px4Flight, Span
+from care_core.ecosystems.px4.flight import LANDED, RESULT, Px4Flight
+from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
 

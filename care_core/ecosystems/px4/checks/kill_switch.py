@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import KILLED, Finding
 from care_core.ecosystems.px4 import attitude
-from care_core.ecosystems.px4.flight import LANDED, MESSAGES, POSITION, SAID_WITHIN_S, Px4Flight, Span
+from care_core.ecosystems.px4.flight import LANDED, MESSAGES, POSITION, SAID_WITHIN_S, Px4Flight
 from care_core.ecosystems.px4.upset import COMBINED, FORCES, falls_after, leans_over_deg
+from care_core.ecosystems.spans import Span
 from care_core.logs.base import Wanted, merge_needs
 
 READS: Wanted = merge_needs(

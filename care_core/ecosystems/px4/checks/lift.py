@@ -16,7 +16,8 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import UNPOWERED, Finding
-from care_core.ecosystems.px4.flight import POSITION, Px4Flight, Span
+from care_core.ecosystems.px4.flight import POSITION, Px4Flight
+from care_core.ecosystems.spans import Span, during, runs, within
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
 from care_core.numbers import Floats, median
@@ -84,7 +85,7 @@ def drawn_while_lifting(flight: Px4Flight) -> float | None:
     if battery is None or thrust is None:
         return None
     t, amps = battery.t, battery["current_a"]
-    armed = np.logical_or.reduce([(t >= start) & (t <= end) for start, end in flight.armed])
+    armed = during(flight.armed, t)
     measured = armed & (np.interp(t, *thrust) > _LIFTS) & np.isfinite(amps) & (amps >= 0.0)
     if measured.sum() < _FEWEST or float(np.ptp(amps[np.isfinite(amps)])) < _MEASURED_A:
         return None
@@ -108,7 +109,7 @@ def _unpowered(flight: Px4Flight, lacking: Finding, drawn_w: float) -> Finding:
 
 
 def _told(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator[Finding]:
-    spans = [span for span in flight.spans(end.t, end.holds) if span[1] - span[0] >= _LASTS_S]
+    spans = [span for span in runs(end.t, end.holds) if span[1] - span[0] >= _LASTS_S]
     flown = [span for span in spans if _is_flown(flight, span) and _is_heard(flight, span)]
     if flown:
         start, stop = flown[0]
@@ -142,7 +143,7 @@ def _goes(climbs: float, ending: str = "") -> str:
 
 
 def _is_flown(flight: Px4Flight, span: Span) -> bool:
-    return any(start <= span[0] <= end for start, end in flight.armed)
+    return within(flight.armed, span[0])
 
 
 def _vertical(flight: Px4Flight) -> tuple[Floats, Floats, Floats] | None:

@@ -14,6 +14,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4 import motors
 from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.spans import seconds_in
 from care_core.ecosystems.vehicles.settings import number
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import median
@@ -33,7 +34,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     """One finding, of the middle of all the time in the air."""
     asked, settings = motors.commands(flight), flight.log.settings()
     aloft = flight.aloft
-    if asked is None or not flight.hovers or sum(end - start for start, end in aloft) < _FLOWN_S:
+    if asked is None or not flight.hovers or seconds_in(aloft) < _FLOWN_S:
         return
     drag = [number(settings, f"CA_ROTOR{n - 1}_KM") for n in asked.numbers]
     one = [k for k, km in enumerate(drag) if km is not None and km > 0.0]

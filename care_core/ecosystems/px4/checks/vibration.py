@@ -13,6 +13,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.spans import runs
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import median
 from care_core.records import Record
@@ -60,7 +61,7 @@ def _shaken(flight: Px4Flight, imu: str, metric: _Metric, upset_s: float) -> Fin
     table = flight.table(imu, metric.field)
     if table is None:
         return None
-    spans = flight.spans(table.t, table[metric.field] > metric.limit)
+    spans = runs(table.t, table[metric.field] > metric.limit)
     lasting = [(start, end) for start, end in spans if end - start >= _LASTS_S and start - _LATE_S <= upset_s]
     if not lasting:
         return None

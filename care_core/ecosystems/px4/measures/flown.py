@@ -25,6 +25,7 @@ from care_core.ecosystems.px4.measures.requested import (
     items_in_all,
     requested_mission,
 )
+from care_core.ecosystems.spans import within
 from care_core.ecosystems.vehicles import way_of
 from care_core.ecosystems.vehicles.way import AIRBORNE_M, Phase, Track, distance_to_legs, phases_home, span_in
 from care_core.logs.base import Wanted, merge_needs
@@ -106,7 +107,7 @@ def flight_of(mission: Mission) -> Px4Flight:
 
 def is_armed(mission: Mission) -> bool:
     """Whether the vehicle was armed in this mission, which may be a refusal to arm."""
-    return any(start <= mission.start_s <= end for start, end in flight_of(mission).armed)
+    return within(flight_of(mission).armed, mission.start_s)
 
 
 def flown_mission(mission: Mission) -> FlownMission | Unavailable:

@@ -20,6 +20,7 @@ from care_core.ecosystems.px4.measures.flown import (
     span_of_phase,
 )
 from care_core.ecosystems.px4.measures.requested import ITEM, requested_mission
+from care_core.ecosystems.spans import Span
 from care_core.ecosystems.statistic import statistic
 from care_core.run import Unavailable, Value
 
@@ -37,7 +38,7 @@ def position(bears: Bears) -> RestsOn:
     return rests_on
 
 
-def _positions(mission: Mission, spans: list[tuple[float, float]], bears: Bears, *moments: float) -> Samples:
+def _positions(mission: Mission, spans: list[Span], bears: Bears, *moments: float) -> Samples:
     table = mission.tables.get(POSITION)
     t = np.empty(0) if table is None else table.t
     return Samples(f"the position ({POSITION})", t, spans, bears, moments, dead=flight_of(mission).repeats(POSITION))

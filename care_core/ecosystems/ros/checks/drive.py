@@ -23,6 +23,7 @@ from care_core.ecosystems.ros.motion import (
     Odometry,
 )
 from care_core.ecosystems.ros.sensors import Battery
+from care_core.ecosystems.spans import Span, seconds_in
 from care_core.numbers import Bools, Floats, known_median, median, quantile
 from care_core.records import replace
 from care_core.text import log_time
@@ -99,7 +100,7 @@ def find(drive: Drive) -> Iterator[Finding]:
         yield from _pulling(drive, motion)
 
 
-def standstills(drive: Drive) -> list[tuple[float, float]]:
+def standstills(drive: Drive) -> list[Span]:
     """When the robot stood against its commands, however shortly."""
     motion = drive.following
     if motion is None:
@@ -247,9 +248,9 @@ def _stood(motion: Following) -> Bools:
     return motion.to_move & (stands | ((wanted >= BREAKS_LOOSE_MPS) & (speed < STANDING * wanted)))
 
 
-def _standing(drive: Drive, motion: Following, long: list[tuple[float, float]]) -> Finding:
+def _standing(drive: Drive, motion: Following, long: list[Span]) -> Finding:
     """Against its commands the drive stands: it failed, or something holds it, which its current tells."""
-    span, total_s = (long[0][0], long[-1][1]), sum(stop - begin for begin, stop in long)
+    span, total_s = (long[0][0], long[-1][1]), seconds_in(long)
     inside = (motion.odometry.t >= span[0]) & (motion.odometry.t <= long[0][1])
     wanted = float(median(np.abs(motion.wanted_speed[inside])))
     order = f"commanded {wanted:.2f} m/s" if wanted > 0 else "commanded to turn"
@@ -267,9 +268,7 @@ def _standing(drive: Drive, motion: Following, long: list[tuple[float, float]]) 
     return _finding(drive, "the drive does not answer its commands", span, evidence, otherwise="critical")
 
 
-def _currents(
-    battery: Battery, motion: Following, long: list[tuple[float, float]]
-) -> tuple[float, float, float] | None:
+def _currents(battery: Battery, motion: Following, long: list[Span]) -> tuple[float, float, float] | None:
     """Current while standing, while idle and while driving, A; None where the recording does not tell them apart."""
     odometry = motion.odometry
     stood = np.zeros(len(battery.t), bool)
@@ -284,7 +283,7 @@ def _currents(
     return (drawn, idle, driving) if driving > IDLE * idle > 0 else None
 
 
-def _unbroken(t: Floats, stood: Bools) -> list[tuple[float, float]]:
+def _unbroken(t: Floats, stood: Bools) -> list[Span]:
     """First and last time of each stretch in which every sample stands."""
     edges = np.flatnonzero(np.diff(stood.astype(int)) | (np.diff(t) > LOST_S)) + 1
     bounds = [0, *edges.tolist(), len(t)]
@@ -292,7 +291,7 @@ def _unbroken(t: Floats, stood: Bools) -> list[tuple[float, float]]:
     return [(float(t[first]), float(t[last])) for first, last in spans]
 
 
-def _stopping(drive: Drive, motion: Following, still: list[tuple[float, float]]) -> Iterator[Finding]:
+def _stopping(drive: Drive, motion: Following, still: list[Span]) -> Iterator[Finding]:
     """Many short standstills close together."""
     starts = np.array([start for start, _ in still])
     stood_s = np.array([end - start for start, end in still])

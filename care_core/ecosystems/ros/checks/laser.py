@@ -12,8 +12,9 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import CLOUD, GOALS, ODOMETRY, ROSOUT, SCAN, reading, type_of
-from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS, stretches
+from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS
 from care_core.ecosystems.ros.sensors import Scans
+from care_core.ecosystems.spans import stretches, unbroken
 from care_core.numbers import Floats, median, quantile
 from care_core.text import shortened
 
@@ -120,8 +121,7 @@ def _heard(times: Floats, start: float, end: float) -> int:
 def _frozen(drive: Drive, scans: Scans) -> Iterator[Finding]:
     same = np.array([a.tobytes() == b.tobytes() for a, b in pairwise(scans.raw)], bool)
     same &= np.isfinite(scans.ranges[1:]).sum(axis=1) >= RETURNS  # where nothing is near, every scan is alike
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], same, [False])).astype(np.int8)))
-    runs = [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+    runs = [(first, last + 1) for first, last in unbroken(same)]
     again = [last - first for first, last in runs if _moves(drive, scans.t[first], scans.t[last])]
     for first, last in runs:
         start, end, count = float(scans.t[first]), float(scans.t[last]), last - first

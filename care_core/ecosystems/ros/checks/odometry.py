@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros.checks.drive import standstills
@@ -18,6 +17,7 @@ from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive, way_through
 from care_core.ecosystems.ros.messages import COMMANDS, GOALS, ODOMETRY, PLACED, TF, holds, reading
 from care_core.ecosystems.ros.motion import IN_TURN_M as TURN_M
 from care_core.ecosystems.ros.motion import STALE_S, Odometry, never_moved
+from care_core.ecosystems.spans import Span, inside
 from care_core.logs.base import Table
 from care_core.numbers import Floats, median, quantile
 
@@ -235,7 +235,7 @@ def _drift(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
             return
 
 
-def _pushed(drive: Drive) -> list[tuple[float, float]]:
+def _pushed(drive: Drive) -> list[Span]:
     """When something else than its wheels moved or held the robot: contacts, a fall, standing against commands."""
     spans = [(at - BEFORE_S, at + PUSHED_S) for at in drive.contacts_s.tolist()]
     spans += [] if drive.fall is None else [(drive.fall.start_s - BEFORE_S, np.inf)]

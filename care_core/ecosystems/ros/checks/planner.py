@@ -13,14 +13,9 @@ from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.goals import Goal
 from care_core.ecosystems.ros.messages import COMMANDS, GOALS, ODOMETRY, ROSOUT, reading
-from care_core.ecosystems.ros.motion import (
-    BREAKS_LOOSE_MPS,
-    STANDS_RADPS,
-    Commands,
-    Odometry,
-    stretches,
-)
+from care_core.ecosystems.ros.motion import BREAKS_LOOSE_MPS, STANDS_RADPS, Commands, Odometry
 from care_core.ecosystems.ros.node_messages import Level, LogMessage
+from care_core.ecosystems.spans import stretches
 from care_core.text import shortened
 
 FAILS = re.compile(

@@ -10,7 +10,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive
 from care_core.ecosystems.ros.messages import FIX, GOALS, holds, reading
-from care_core.ecosystems.ros.motion import stretches
+from care_core.ecosystems.spans import stretches
 from care_core.logs.base import Table
 from care_core.numbers import Bools, Floats, median
 from care_core.records import replace

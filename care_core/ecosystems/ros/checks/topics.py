@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.coverage import Span
 from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.ecosystems.plausible import STAMP, set_forward
 from care_core.ecosystems.ros.drive import SILENT_PERIODS, SILENT_S, STREAM_MESSAGES, Drive
@@ -29,6 +28,7 @@ from care_core.ecosystems.ros.messages import (
     type_of,
 )
 from care_core.ecosystems.ros.node_messages import Level
+from care_core.ecosystems.spans import Span, seconds_in
 from care_core.ecosystems.timeline import counted
 from care_core.logs.base import Channel
 from care_core.logs.recording import RENAMED
@@ -155,7 +155,7 @@ def _silent(drive: Drive, spans: list[Span]) -> Iterator[Finding]:
     if not spans:
         return
     start, end = max(spans, key=lambda span: span[1] - span[0])
-    times = f"{len(spans)} such times, {sum(b - a for a, b in spans):.0f} s in all; " if len(spans) > 1 else ""
+    times = f"{len(spans)} such times, {seconds_in(spans):.0f} s in all; " if len(spans) > 1 else ""
     gone = _gone(drive, start)
     words = _meanwhile(drive, list(drive.regular), gone, start, end)
     yield Finding(

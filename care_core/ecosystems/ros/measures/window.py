@@ -12,22 +12,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.coverage import MEAN, SUM, Bears, Samples, Span, doubt
+from care_core.ecosystems.coverage import MEAN, SUM, Bears, Samples, doubt
 from care_core.ecosystems.measures import Args, Mission, RestsOn, missing
 from care_core.ecosystems.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.ecosystems.ros.drive import Drive, way_through
 from care_core.ecosystems.ros.goals import Goal
-from care_core.ecosystems.ros.motion import (
-    STANDS_MPS,
-    STANDS_RADPS,
-    Commands,
-    Odometry,
-    Poses,
-    moved_to,
-    never_moved,
-    stretches,
-)
+from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS, Commands, Odometry, Poses, moved_to, never_moved
 from care_core.ecosystems.ros.recoveries import Recoveries
+from care_core.ecosystems.spans import Span, stretches
 from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats
 from care_core.records import Record, replace

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.spans import during
 from care_core.numbers import Floats, median
 
 _G = 9.81

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
 from care_core.metadata.ardupilot import firmware_default
 from care_core.numbers import Bools

@@ -11,10 +11,10 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.checks.settings.output_range import Kept, kept_from_range
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Wanted
 from care_core.numbers import known_median, median
 

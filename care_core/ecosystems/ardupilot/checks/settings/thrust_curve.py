@@ -15,9 +15,9 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.battery import FULL_V, Battery
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during
 from care_core.logs.base import Wanted
 from care_core.records import Record
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.checks.settings.output_range import kept_from_range
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"QTUN": ("ThO",)}

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting, steady
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 

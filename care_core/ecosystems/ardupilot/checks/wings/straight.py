@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import smooth
 from care_core.ecosystems.base import Limits
+from care_core.ecosystems.spans import during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median
 

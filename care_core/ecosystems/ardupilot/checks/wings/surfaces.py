@@ -14,10 +14,10 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.checks.wings import straight
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Span, during, runs
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import Span, during, runs
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import Floats, median
 
