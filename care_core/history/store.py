@@ -75,28 +75,6 @@ class About(Record):
 
     robot: Robot | None = None
     asked: Mapping[str, float] = field(default_factory=dict)
-    firmware: str = ""
-    settings: Mapping[str, float | str] = field(default_factory=dict)
-    recording: str = ""
-    """What copies of its log share."""
-    terms: str = ""
-    """What it was judged by where that was not the profile alone, as a digest."""
-    individual: Mapping[str, float | str] = field(default_factory=dict)
-    """The parameters that tell this vehicle from others of its kind."""
-    judged_with: str = ""
-    """Options that gave it other limits or another reference than its own, as they were typed."""
-
-
-class Triaged(Record):
-    """One remembered triage."""
-
-    at: str
-    """When, ISO 8601 in UTC."""
-    log_path: str
-    mission: int
-    document: Mapping[str, Any]
-    robot: Robot | None = None
-    asked: Mapping[str, float] = field(default_factory=dict)
     """What the mission asked for, by context of the profile."""
     firmware: str = ""
     settings: Mapping[str, float | str] = field(default_factory=dict)
@@ -109,6 +87,16 @@ class Triaged(Record):
     """The parameters that tell this vehicle from others of its kind; empty where the log holds none."""
     judged_with: str = ""
     """Options that gave it other limits or another reference than its own, as they were typed."""
+
+
+class Triaged(About, kw_only=True):
+    """One remembered triage, with what is remembered beside its document."""
+
+    at: str
+    """When, ISO 8601 in UTC."""
+    log_path: str
+    mission: int
+    document: Mapping[str, Any]
 
 
 class Verified(Record):
@@ -245,23 +233,25 @@ class History(Record):
         said = {**plain(About()), **self._document(about), "settings": {}}  # an earlier version told less
         if settings is not None:
             said["settings"] = self._document(self._unpacked(settings))
-        known = self._checked(About, *(said[name] for name in About.__struct_fields__))
         document = self._document(text)
         try:
             read(_Searched, {name: document.get(name) for name in _Searched.__struct_fields__})
         except (UnfitError, OverflowError) as err:
             raise self._unusable("a record in it is damaged") from err
-        told = (getattr(known, name) for name in About.__struct_fields__)
-        return self._checked(Triaged, at, path, mission, document, *told)
+        known = {name: said[name] for name in About.__struct_fields__}
+        return self._checked(Triaged, at=at, log_path=path, mission=mission, document=document, **known)
 
     def _verified(self, at: str, name: str, version: str, p: float, worked: int | None, text: str) -> Verified:
         did_work = None if worked is None else bool(worked)
-        return self._checked(Verified, at, name, version, p, did_work, self._document(text))
+        document = self._document(text)
+        return self._checked(
+            Verified, at=at, profile=name, version=version, p_fixed=p, worked=did_work, document=document
+        )
 
-    def _checked(self, kind: type[R], *values: Any) -> R:
+    def _checked(self, kind: type[R], **values: Any) -> R:
         """A record of these values, each of the type that the record declares."""
         try:
-            return read(kind, dict(zip(kind.__struct_fields__, values, strict=False)))
+            return read(kind, values)
         except (UnfitError, OverflowError) as err:
             raise self._unusable("a record in it is damaged") from err
 
@@ -402,11 +392,7 @@ def _schema(version: int) -> frozenset[tuple[str, str, str]]:
 def insert_triage(connection: sqlite3.Connection, document: Mapping[str, Any], mission: int, about: About) -> None:
     """Put a triage into the store, in the transaction of whoever has more to write with it."""
     log, profile = document["log"], document["profile"] or {"name": "", "version": ""}
-    robot = None if about.robot is None else plain(about.robot)
-    told = {
-        "robot": robot, "asked": about.asked, "firmware": about.firmware, "recording": about.recording,
-        "terms": about.terms, "individual": about.individual, "judged_with": about.judged_with,
-    }  # fmt: skip
+    told = {name: value for name, value in plain(about).items() if name != "settings"}
     settings = zlib.compress(json.dumps(about.settings).encode()) if about.settings else None
     connection.execute(
         "insert into triages (at, profile, version, log_sha256, log_path, mission, document, robot, about, settings)"

@@ -44,7 +44,9 @@ def reading() -> Reading:
 def outputs(diagnosis: Diagnosis) -> Mapping[str, str]:
     """Every format of a diagnosis."""
     report = build_document(diagnosis)
-    history = history_document([Triaged("2026-01-01T00:00:00", "/a.BIN", 1, published(report))], [])
+    history = history_document(
+        [Triaged(at="2026-01-01T00:00:00", log_path="/a.BIN", mission=1, document=published(report))], []
+    )
     return {
         "text": to_text(diagnosis),
         "json": to_json(report),

@@ -45,9 +45,15 @@ def run(
     document["log"].update(path=log, start=begun, sha256=f"{number:064}")
     document["objectives"][1].update(value=time_s, status="fault" if (time_s or 0) > 150 else "ok")
     return Triaged(
-        f"2026-02-{number + 1:02}", log, 1, document, robot, asked or {"legs": 5.0, "path_length": 260.0}, firmware,
+        robot,
+        asked or {"legs": 5.0, "path_length": 260.0},
+        firmware,
         settings or {"WPNAV_SPEED": 500.0},
-    )  # fmt: skip
+        at=f"2026-02-{number + 1:02}",
+        log_path=log,
+        mission=1,
+        document=document,
+    )
 
 
 def told(runs: Sequence[Triaged]) -> tuple[RobotRuns, ...]:
