@@ -15,12 +15,6 @@ from care_core.run import Robot
 from care_core.text import clean
 
 
-def robot_of(log: Log) -> str | None:
-    """A name that all logs of this robot have and no other robot's; None where the log gives none."""
-    robot = identify(log)
-    return robot.id if robot is not None and robot.is_sure else None
-
-
 def identify(log: Log) -> Robot | None:
     """The robot of a log, by the best that the log says of it; None where it says nothing."""
     return next(_names(log), None)

@@ -30,7 +30,6 @@ class Structure(Record, eq=False):
 
     graph: CausalGraph
     pag: Pag
-    kept_options: tuple[str, ...]
     dropped_options: tuple[str, ...]
     direct: tuple[DirectEdge, ...]
     """Option to objective edges that were allowed, because the metrics do not carry the whole effect."""
@@ -77,7 +76,6 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
     return Structure(
         graph=_with_hidden_reasons(completion.graph, pag, together, constraints),
         pag=pag,
-        kept_options=screening.kept,
         dropped_options=screening.dropped,
         direct=completion.direct,
         notes=(

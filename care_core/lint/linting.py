@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 _VEHICLES = ("copter", "plane", "rover", "sub", "tracker", "blimp", "px4")
 _MOST_KNOWN = 0.5
 """The share of its names above which a file is taken for a vehicle's."""
-_MAY_BE_ELSEWHERE = frozenset({"unknown-key", "misplaced-key", "not-loaded"})
 
 
 class Linted(Record):

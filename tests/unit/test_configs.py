@@ -129,7 +129,6 @@ def test_the_later_file_wins(tmp_path: Path) -> None:
 
 
 QGC = "# Vehicle-Id Component-Id Name Value Type\n"
-DUMPED = "dynamic_reconfigure.encoding.Config"
 COMMON = "update_frequency: 4.0\ninflation: {inflation_radius: 1.0}\n"
 NODE = "controller_server:\n  ros__parameters:\n    FollowPath: {max_vel_x: 0.5}\n"
 

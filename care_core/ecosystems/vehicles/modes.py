@@ -80,7 +80,6 @@ _REASONS: Mapping[int, str] = {
     49: "QLand instead of RTL", 50: "dead reckoning failsafe", 51: "take-off mode failsafe",
 }  # fmt: skip
 """MODE.Rsn (ModeReason.h); 0 and 26 are what the firmware does by itself at start."""
-_PILOT = frozenset((1, 2))
 
 # PX4's custom_mode of MAVLink: main mode in the third byte, sub-mode of the automatic ones in the fourth.
 _PX4_MAIN = {1: 0, 2: 1, 3: 2, 5: 10, 6: 14, 7: 15, 8: 16}
