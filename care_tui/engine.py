@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, open_case, predict
+from care_core.application.case import Case, Request, open_case, predict
 from care_core.application.configuring import DiffSide, apply_to_files, commands_of, diff_of, doubts_of
 from care_core.application.history_writing import remember, remember_triage
 from care_core.application.reporting import report_of
 from care_core.application.responses import odds_over
 from care_core.errors import CareError
+from care_core.progress import Progress
 from care_core.records import Record
 from care_core.report.formats import FORMATS, Format
 

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, choose, fitting, open_case, read_case
+from care_core.application.case import Case, Request, choose, fitting, open_case, read_case
 from care_core.errors import CareError, LogError, ProfileError, UsageError
+from care_core.progress import Progress, silent
 from care_core.records import replace
 
 if TYPE_CHECKING:
@@ -18,10 +19,6 @@ if TYPE_CHECKING:
     from care_core.report.document import TriageDocument
     from care_core.report.inspection import InspectDocument
     from care_core.report.verification import VerifyDocument
-
-
-def _silent(_step: str, _share: float) -> None:
-    pass
 
 
 def open_log(path: str | Path) -> Log:
@@ -53,7 +50,7 @@ def inspect(log: str | Path) -> InspectDocument:
     return build_inspection(found, trials, choice, examine(run_model(found)))
 
 
-def triage(asked: Request | str | Path, progress: Progress = _silent) -> Case:
+def triage(asked: Request | str | Path, progress: Progress = silent) -> Case:
     """Diagnose a run: the last mission of a log, or as the request says. Raises CareError."""
     return open_case(_request(asked), progress)
 
@@ -70,14 +67,14 @@ def what_if(asked: Case | Request | str | Path, changes: Mapping[str, float]) ->
         if not isinstance(value, (int, float)):
             hint = f"Pass changes={{'{name}': 40}}."
             raise UsageError(f"The value of '{name}' is {value!r}, not a number.", hint=hint, where="changes")
-    reading = asked.reading if isinstance(asked, Case) else read_case(_request(asked), _silent)
+    reading = asked.reading if isinstance(asked, Case) else read_case(_request(asked), silent)
     if reading is None:
         raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
     schema = reading.profile.schema
     return reading.question.ask({option_named(name, schema).name: value for name, value in changes.items()})
 
 
-def compare(a: Request | str | Path, b: Request | str | Path, progress: Progress = _silent) -> Compared:
+def compare(a: Request | str | Path, b: Request | str | Path, progress: Progress = silent) -> Compared:
     """Two runs side by side, A the one to compare with: `compare(good, failed).report()`. Raises CareError."""
     from care_core.application.comparing import compare as put_beside
 
@@ -117,7 +114,7 @@ def verify(
     asked = log if isinstance(log, Request) else Request(Path(log), profile, mission=mission, reference=good)
     chosen = load_profile(asked.profile) if asked.profile else report_profile(promised, path)
     promise_of(promised, chosen.schema, path)  # a report that promises nothing is refused before a log is read
-    case = open_case(replace(asked, profile=str(chosen.path)), _silent)
+    case = open_case(replace(asked, profile=str(chosen.path)), silent)
     if case.reading is None and case.log is not None:
         try:  # a run without a mission is compared, one of another robot is not
             fitting(case.log, str(chosen.path))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from care_core.application.case import fitting, opened
 from care_core.errors import CareError, ConfigError, LogError
 from care_core.files import read_small_text
 from care_core.profile.site import load_site
+from care_core.progress import Progress
 from care_core.records import replace
 from care_core.text import none_of_logs
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from care_core.logs.base import Log
     from care_core.profile.store import Profile
     from care_core.run import ProfileChoice
-
-Progress = Callable[[str, float], None]
 
 
 def baseline(places: Sequence[Path], profile: str | None, progress: Progress) -> Baseline:

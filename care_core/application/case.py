@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, cast
 
 from care_core.application.open_run import OpenRun, Reading, question_of
 from care_core.errors import CareError
+from care_core.progress import Progress
 from care_core.records import Record, field, force_setattr, replace
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from care_core.variables import Variable
 
 NOTHING: Settings = MappingProxyType({})
-Progress = Callable[[str, float], None]
 """Is told the step and the share that is done, 0 to 1."""
 
 

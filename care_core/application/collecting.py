@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.collect.campaign import Campaign, default_folder, read_campaign
 from care_core.collect.runner import Collected, collect, first_round
 from care_core.errors import ExitCode
+from care_core.progress import Progress
 from care_core.report.collection import CollectDocument, CollectedRun, LeftOutOption, VariedOption
 from care_core.report.document import plain_number
 from care_core.text import clean, csv_table
 
 if TYPE_CHECKING:
     from care_core.collect.sampling import Planned
-
-Progress = Callable[[str, float], None]
 
 
 def run_campaign(path: Path, out: Path | None, *, retry_failed: bool, progress: Progress) -> Collected:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, open_case
+from care_core.application.case import Case, Request, open_case
 from care_core.application.open_run import OpenRun, log_of
 from care_core.application.plotting import MOST_PLOTS, marks_in, ranked, segments
 from care_core.application.proof import meanings
@@ -13,6 +13,7 @@ from care_core.application.sharing import EVERYTHING, Sharing
 from care_core.application.signals import Line as Values
 from care_core.application.signals import Signal, Source, lines_of, whole_of
 from care_core.errors import UsageError, nearest
+from care_core.progress import Progress
 from care_core.records import Record, replace
 from care_core.report.plots import Drawing, Line, Plot
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from care_core.application.case import Case, Progress, Request, open_case
+from care_core.application.case import Case, Request, open_case
 from care_core.diagnose.verdict import RunStatus, verdict_of
 from care_core.errors import LogError
+from care_core.progress import Progress
 from care_core.records import Record
 
 

@@ -9,11 +9,12 @@ from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, open_case
+from care_core.application.case import Case, Request, open_case
 from care_core.errors import CareError
 from care_core.fleet.fleet_report import Fleet, together
 from care_core.fleet.rows import Row, by_folder, row_of, unreadable
 from care_core.fleet.sources import Source, fetched, gather
+from care_core.progress import Progress, silent
 from care_core.records import Record, replace
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def triage_one(source: Source, asked: Request) -> Row:
     """The row of one log: nothing but its bytes and the request decide it. A log that cannot be read is a row too."""
     try:
         with fetched(source) as path:
-            case = open_case(replace(asked, log=path), _silent)
+            case = open_case(replace(asked, log=path), silent)
             return replace(row_of(source.name, case.diagnosis, _world(case)), folder=source.folder)
     except CareError as err:
         return replace(unreadable(source.name, f"{err.message} {err.hint}".strip()), folder=source.folder)
@@ -107,10 +108,6 @@ def _world(case: Case) -> CounterfactualQuery | None:
     if reading is None or reading.judged.run.checks:
         return None
     return query_of(reading.judged, reading.profile)
-
-
-def _silent(_step: str, _share: float) -> None:
-    pass
 
 
 def _said(done: int, unread: int, count: int, took_s: float) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from care_core.application.case import Case, Progress, Request, open_case
+from care_core.application.case import Case, Request, open_case
 from care_core.errors import ProfileError
 from care_core.files import PROFILE_FILE, profile_folders
 from care_core.profile.store import load_profile
+from care_core.progress import Progress
 from care_core.report.graph import GraphDocument, graph_document
 from care_core.report.graph_files import graph_dot, graph_graphml
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.errors import CareError, LogError, UsageError
 from care_core.files import PROFILE_FILE
 from care_core.profile.store import Profile, available_profiles, load_profile
+from care_core.progress import Progress
 from care_core.tables.readiness import RUNS_FILE, Readiness, read_columns, readiness
 from care_core.text import none_of_logs
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from care_core.profile.schema import Schema
     from care_core.scaffold.scaffold import Scaffold
 
-Progress = Callable[[str, float], None]
 
 _NAME = re.compile(r"[A-Za-z][\w.-]*")
 

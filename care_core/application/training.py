@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from json import dumps
 from pathlib import Path
@@ -16,6 +16,7 @@ from care_core.files import PROFILE_FILE, read_small_text
 from care_core.profile.model import ARRAYS_FILE, MODEL_FILE, write_model
 from care_core.profile.reading import parse_schema, read_schema
 from care_core.profile.store import CARD_FILE, load_profile
+from care_core.progress import Progress
 from care_core.records import asdict
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from care_core.profile.store import Profile
 
 SIGNIFICANT = 4
-
-Progress = Callable[[str, float], None]
 
 
 @contextmanager

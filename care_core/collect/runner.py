@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from pathlib import Path
@@ -33,12 +33,12 @@ from care_core.collect.sampling import (
 from care_core.configs.driven import parameter_value, readable
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import CareError, UsageError
+from care_core.progress import Progress
 from care_core.records import Struct, field
 from care_core.tables.rows import ABOUT, CONDITIONS, KIND, TableRow, check_table_path, write_rows, write_table
 
 TABLE = "runs.csv"
 
-Report = Callable[[str, float], None]
 
 _LOOK_S = 0.2
 """How often an interruption is looked for."""
@@ -106,7 +106,7 @@ def first_round(campaign: Campaign) -> list[Planned]:
     return with_repeats(space, configs, count, campaign.repeats, campaign.seed, campaign.reference)
 
 
-def collect(campaign: Campaign, folder: Path, *, retry_failed: bool = False, progress: Report) -> Collected:
+def collect(campaign: Campaign, folder: Path, *, retry_failed: bool = False, progress: Progress) -> Collected:
     """Make every run of a campaign that was not made yet, and write the table of runs.
 
     Args:
@@ -217,7 +217,7 @@ class _Work(Struct, eq=False):
     found: Collected
     journal: Journal
     again: set[int]
-    progress: Report
+    progress: Progress
     stop: threading.Event = field(default_factory=threading.Event)
     since: float = field(default_factory=time.monotonic)
     now: int = 0

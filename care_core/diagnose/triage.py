@@ -6,7 +6,7 @@ comparison and verification come by it too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from care_core.diagnose import provenance
 from care_core.diagnose.advice import (
@@ -39,13 +39,12 @@ from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.progress import Progress
 from care_core.records import replace
 from care_core.run import Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting, shown
 from care_core.text import listed
 
 FROM_HISTORY = "what was changed since this robot's last good run in the history counts as evidence"
-
-Progress = Callable[[str, float], None]
 
 
 def triage(

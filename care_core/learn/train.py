@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -42,10 +42,10 @@ from care_core.learn.structure import Structure, learn_structure
 from care_core.learn.table import varying
 from care_core.numbers import Floats
 from care_core.profile.schema import Schema
+from care_core.progress import Progress
 from care_core.records import Record, replace
 
 Edge = tuple[str, str]
-Progress = Callable[[str, float], None]
 
 BACKGROUND = 32
 """Training runs over which an effect is averaged."""

@@ -9,7 +9,7 @@ near them it is theirs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 
 import numpy as np
 import pandas as pd
@@ -30,6 +30,7 @@ from care_core.learn.screening import screen_options
 from care_core.learn.train import Learned, TrainSettings, assemble
 from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
+from care_core.progress import Progress
 from care_core.records import Record, replace
 from care_core.variables import Role
 
@@ -39,8 +40,6 @@ FEWEST = 3
 """Fewer runs say nothing of what they have in common."""
 ENOUGH_FOR_EFFECTS = 100
 """With fewer runs the graph and the effects stay the source's: a profile has some hundred variables."""
-
-Progress = Callable[[str, float], None]
 
 
 class OutOfSupport(Record):

@@ -29,11 +29,10 @@ from care_core.outputs import REMOVE_HINT, write_output
 from care_core.parallel import Failed, each
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
+from care_core.progress import Progress
 from care_core.records import Record, Struct, field
 from care_core.tables.rows import TableRow, rows_of
 from care_core.text import csv_table, none_of_logs
-
-Report = Callable[[str, float], None]
 
 
 class Failure(Record):
@@ -69,7 +68,7 @@ def ingest(
     *,
     workers: int | None = None,
     limit_s: float = 600.0,
-    progress: Report,
+    progress: Progress,
     read: Callable[[Path, Schema], list[TableRow]] = rows_of,
 ) -> Ingested:
     """Read every log, going on with what `journal_of(out)` holds. The caller removes the journal when all is written.

@@ -13,6 +13,7 @@ from care_core.application.case import Request
 from care_core.application.viewing import Past, past_runs
 from care_core.diagnose.verdict import fit_words
 from care_core.errors import CareError
+from care_core.progress import silent
 from care_core.report.entries import health_again
 from care_core.text import clean, number_of
 from care_tui.messages import OpenLog
@@ -112,7 +113,7 @@ class HistoryPage(FiguredPage):
             return Rows(comparison(past, other))
         a, b = (Request(Path(run.log), mission=run.mission or None) for run in self._compared)
         compare = self.workspace.engine.compare
-        whole = self.fetched(WHOLE, lambda: compare(a, b, _silent))
+        whole = self.fetched(WHOLE, lambda: compare(a, b, silent))
         if isinstance(whole, CareError):
             return error_rows(whole)
         if whole is None:
@@ -257,10 +258,6 @@ class HistoryPage(FiguredPage):
             self.refresh_bindings()
             if self._marked is not None and len(self._runs) > 1:
                 self.say("Marked: go to another run to compare it with this one.")
-
-
-def _silent(_step: str, _share: float) -> None:
-    """Nobody is told how far a comparison has come."""
 
 
 def comparison(past: Past, other: Past) -> list[Row]:

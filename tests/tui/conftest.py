@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
-from care_core.application.case import Case, Progress, Request
+from care_core.application.case import Case, Request
 from care_core.application.configuring import DiffSide
 from care_core.diagnose.records import Diagnosis, Fix, Odds
+from care_core.progress import Progress
 from care_core.variables import Change, Variable
 from care_tui.app import CareApp
 from care_tui.engine import Engine

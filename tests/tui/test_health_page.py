@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from care_core.application.case import Case, Progress, Request
+from care_core.application.case import Case, Request
 from care_core.diagnose.records import Diagnosis, Hypothesis, MissionVerdict
 from care_core.ecosystems.findings import WHOLE_LOG, Finding, Health
+from care_core.progress import Progress
 from care_core.records import replace
 from care_core.run import Check, Fit, MissionInfo
 from care_tui.app import CareApp

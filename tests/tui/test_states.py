@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 from textual import events
 
-from care_core.application.case import Case, Progress, Request
+from care_core.application.case import Case, Request
 from care_core.errors import CareError, ExitCode, LogError, ProfileError
+from care_core.progress import Progress
 from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.places import as_path, entries, found_logs, recent_logs, remember
