@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from care_core.application.open_run import OpenRun, log_of
 from care_core.application.signals import Source, lines_of, type_name, whole_of
 from care_core.errors import CareError
+from care_core.geodesy import offset_m
 from care_core.records import Record
 
 if TYPE_CHECKING:
     from care_core.ecosystems.ros.goals import Goal
     from care_core.numbers import Floats
 
-_METRES_PER_DEGREE = 111_195.0
 _GLOBAL = (("POS", "Lat", "Lng"), ("GPS", "Lat", "Lng"), ("vehicle_global_position", "lat", "lon"))
 _ITEMS = {
     "CMD": ("CNum", "Lat", "Lng"),
@@ -85,8 +85,8 @@ def _on_the_ground(t: Floats, lng: Floats, lat: Floats, corners: tuple[Point, ..
 
 def _metres(home: Point, place: Point) -> Point:
     """Metres east and north of home of a place, both in degrees, longitude first."""
-    narrow = math.cos(math.radians(home[1]))
-    return (place[0] - home[0]) * _METRES_PER_DEGREE * narrow, (place[1] - home[1]) * _METRES_PER_DEGREE
+    north, east = offset_m(home[::-1], place[1], place[0])
+    return east, north
 
 
 def _flown_from(case: OpenRun, present: Mapping[str, str], channel: str) -> tuple[Point, ...]:

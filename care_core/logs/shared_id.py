@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from care_core.geodesy import METRES_PER_DEGREE
 from care_core.logs.base import Table
 from care_core.numbers import Floats
 
@@ -21,7 +22,7 @@ _TURNS = 6
 """Changes to and fro from which on two take turns: a restart, or a clock that is set, is one."""
 _BOOT_S = 3.0
 """Clocks since the start farther apart than any delay of a link."""
-_APART_M, _METRES_PER_DEGREE = 30.0, 111_319.5
+_APART_M = 30.0
 """Farther than a vehicle gets between two messages and back."""
 
 
@@ -34,7 +35,7 @@ def sharing(tables: Mapping[str, Table]) -> str:
             return "its messages take turns between two clocks since the start"
     if (place := tables.get("GLOBAL_POSITION_INT")) is not None:
         known = place.where((place["lat"] != 0) | (place["lon"] != 0))
-        if any(_turns(known[axis] / 1e7 * _METRES_PER_DEGREE, _APART_M) for axis in ("lat", "lon")):
+        if any(_turns(known[axis] / 1e7 * METRES_PER_DEGREE, _APART_M) for axis in ("lat", "lon")):
             return "its positions take turns between two places"
     return ""
 

@@ -35,6 +35,7 @@ from care_core.ecosystems.liveness import (
 )
 from care_core.ecosystems.spans import Span, during
 from care_core.ecosystems.vehicles import flies
+from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import Floats
 
@@ -68,7 +69,6 @@ SOURCES = (
          _ANY, is_optional=True, mission_lost=ASIDE),
 )  # fmt: skip
 _SAME_THROTTLE = 0.03
-_METRES = 111_319.5
 _ZEROS: Mapping[str, tuple[FindingKind, str, tuple[str, ...]]] = {
     "MAG": ("compass", "compass", ("MagX", "MagY", "MagZ")),
     "ARSP": ("airspeed", "airspeed sensor", ("Airspeed",)),
@@ -215,8 +215,8 @@ def _way_m(place: Table) -> float:
     known = place.where((np.abs(place["Lat"]) > 1e-6) & np.isfinite(place["Lat"] + place["Lng"]))
     if not len(known):
         return 0.0
-    across = np.cos(np.radians(known["Lat"][0]))
-    return ranged(known["Lat"] * _METRES, known["Lng"] * _METRES * across)
+    first = float(known["Lat"][0]), float(known["Lng"][0])
+    return ranged(*offset_m(first, known["Lat"], known["Lng"]))
 
 
 def _turned_by_gyro(imu: Table | None) -> float:

@@ -25,6 +25,7 @@ from care_core.ecosystems.liveness import (
     turned,
 )
 from care_core.ecosystems.spans import Span, inside
+from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import Floats
 
@@ -76,7 +77,6 @@ _VALID = {("vehicle_local_position", "x"): "xy_valid", ("vehicle_local_position"
 know (VehicleLocalPosition.msg)."""
 _DEGREES = 1e7
 """Before 1.14 latitudes are integers of 1e-7 degrees."""
-_METRES = 111_319.5
 _BATTERY = "battery_status"
 _NO_FIX = 1.0
 """fix_type of a receiver without a fix (SensorGps.msg)."""
@@ -185,7 +185,7 @@ def _holds(tables: dict[str, Table], name: str, *fields: str) -> bool:
 def _way_m(place: Table, lat_name: str, lon_name: str) -> float:
     scale = 1.0 if lat_name.endswith("_deg") else 1 / _DEGREES
     lat, lon = place[lat_name] * scale, place[lon_name] * scale
-    return ranged(lat * _METRES, lon * _METRES * np.cos(np.radians(lat[0])))
+    return ranged(*offset_m((float(lat[0]), float(lon[0])), lat, lon))
 
 
 def _yaw_deg(attitude: Table) -> Floats:

@@ -1,14 +1,11 @@
-"""The way that a vehicle was asked to fly or drive, and the track that it took, in metres around home.
-
-Positions are north and east of home on a plane, which is exact to centimetres over a few kilometres.
-"""
+"""The way that a vehicle was asked to fly or drive, and the track that it took, in metres north and east of home."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,7 +13,6 @@ from care_core.numbers import Floats, distinct, median
 from care_core.records import Record
 from care_core.run import Unavailable, Value
 
-METRES_PER_DEGREE = 111_319.49
 AIRBORNE_M = 2.0
 """Height above home from which a vehicle counts as airborne."""
 FILL_S = 0.05
@@ -25,20 +21,12 @@ FILLABLE_S = 0.6
 """Median spacing above which a corner between two positions could be anything, and nothing is filled in."""
 
 Ending = Literal["return", "land", "open"]
-Coordinate = TypeVar("Coordinate", float, Floats)
-"""Of one place, or of many, shape (n,)."""
 
 _SHARP_DEG = 60.0
 """Corners from which a vehicle that turns on the spot stops and does so (AR_PivotTurn.cpp: WP_PIVOT_ANGLE)."""
 _AT_HEIGHT_M = 0.5
 _LEVEL_M = 0.5
 """Height difference below which a leg is level."""
-
-
-def offset_m(home: Sequence[float], lat: Coordinate, lon: Coordinate) -> tuple[Coordinate, Coordinate]:
-    """Metres north and east of home, whose latitude and longitude come first."""
-    narrow = math.cos(math.radians(home[0]))
-    return (lat - home[0]) * METRES_PER_DEGREE, (lon - home[1]) * METRES_PER_DEGREE * narrow
 
 
 class RequestedMission(Record, eq=False):

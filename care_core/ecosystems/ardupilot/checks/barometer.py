@@ -26,6 +26,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.spans import inside
 from care_core.ecosystems.vehicles import flies
+from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, quantile
 
@@ -68,7 +69,6 @@ _ODDS = LIMITS.add("probability where a range finder contradicts it", 0.3, "", "
 _RANGE_GOOD = 4
 """RangeFinder::Status::Good (AP_RangeFinder.h)."""
 _FIX = 3
-_METRES_PER_DEGREE = 111_319.5
 
 
 class _Test(NamedTuple):
@@ -172,9 +172,7 @@ def _where_it_began(flight: Flight, t: Floats) -> Bools:
     lat, lng = float(first["Lat"][0]), float(first["Lng"][0])
 
     def away(part: Table) -> Floats:
-        north = (part["Lat"] - lat) * _METRES_PER_DEGREE
-        east = (part["Lng"] - lng) * _METRES_PER_DEGREE * np.cos(np.radians(lat))
-        return np.asarray(np.hypot(north, east))
+        return np.asarray(np.hypot(*offset_m((lat, lng), part["Lat"], part["Lng"])))
 
     return np.asarray(np.interp(t, track.t, np.concatenate([*map(away, parts(track))])) < _BEGAN_M)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,6 +12,7 @@ from care_core.ecosystems.ardupilot.held_missions import PLACES, TAKEOFF, Item
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during
+from care_core.geodesy import offset_m
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"CTUN": ("DAlt",), "POS": ("Lat", "Lng")}
@@ -26,7 +28,6 @@ _TOO_HIGH, _TOO_FAR = 1, 2
 """Kinds of breach (AC_Fence.h: AC_FENCE_TYPE_ALT_MAX, AC_FENCE_TYPE_CIRCLE)."""
 _ABOVE_HOME = frozenset((3, 6))
 """Frames of a height above home (MAV_FRAME)."""
-_METRES = 111319.5
 _SWITCHES = ("FENCE_ENABLE", "FENCE_AUTOENABLE")
 
 
@@ -83,10 +84,9 @@ def _farthest(flight: Flight) -> float | None:
     if been is None or not flight.armed:
         return None
     row = min(int(np.searchsorted(been.t, flight.armed[0][0])), len(been) - 1)
-    lat, lng = float(been["Lat"][row]), float(been["Lng"][row])
-    east = float(np.cos(np.radians(lat)))
-    away = (np.hypot(item.lat - lat, (item.lng - lng) * east) for item in _places(flight) if item.lat or item.lng)
-    return max((float(one) * _METRES for one in away), default=None)
+    here = float(been["Lat"][row]), float(been["Lng"][row])
+    places = (item for item in _places(flight) if item.lat or item.lng)
+    return max((math.hypot(*offset_m(here, item.lat, item.lng)) for item in places), default=None)
 
 
 def _places(flight: Flight) -> Iterator[Item]:

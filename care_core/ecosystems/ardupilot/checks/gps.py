@@ -18,6 +18,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.spans import during, inside, seconds_in, within
 from care_core.ecosystems.vehicles import flies
+from care_core.geodesy import METRES_PER_DEGREE, offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, quantile
 
@@ -48,7 +49,7 @@ _HACC_M = LIMITS.add("accuracy of the position", 10.0, "m", "twice what the firm
 _SACC_MS = LIMITS.add("accuracy of the speed", 3.0, "m/s", "three times what the firmware's checks want")
 _TURNS = LIMITS.add("records that lie elsewhere between two of one place", 2, "", "a choice: one may be a glitch")
 _CLOCK = LIMITS.add("pace of the receiver's clock, either way", 2.0, "", "a choice: simulators run at their own pace")
-_METRES, _DAY_MS = 111319.5, 86_400_000.0
+_DAY_MS = 86_400_000.0
 _FIX = 3
 _ERR_GPS, _ERR_GPS_LOST, _GLITCH = 11, 7, 2
 _JUMP = calibrated(
@@ -144,7 +145,7 @@ def _of_two(table: Table) -> bool:
     before did, again and again. A receiver that was led astray comes back to within its noise, and not at once."""
     lat, lng = table["Lat"], table["Lng"]
     is_back = (lat[2:] == lat[:-2]) & (lng[2:] == lng[:-2])
-    metres = np.hypot(lat[1:-1] - lat[:-2], (lng[1:-1] - lng[:-2]) * np.cos(np.radians(lat[0]))) * _METRES
+    metres = np.hypot(lat[1:-1] - lat[:-2], (lng[1:-1] - lng[:-2]) * np.cos(np.radians(lat[0]))) * METRES_PER_DEGREE
     return int(np.count_nonzero(is_back & (metres > JUMP_M))) >= _TURNS
 
 
@@ -157,8 +158,9 @@ def _unexplained(table: Table) -> tuple[Floats, Floats]:
             dt = np.where(own > 0, own, dt)
     course = np.radians(table["GCrs"])
     north, east = table["Spd"] * np.cos(course), table["Spd"] * np.sin(course)
-    d_north = np.diff(table["Lat"]) * _METRES - dt * (north[1:] + north[:-1]) / 2
-    d_east = np.diff(table["Lng"]) * _METRES * np.cos(np.radians(table["Lat"][0])) - dt * (east[1:] + east[:-1]) / 2
+    went_north, went_east = map(np.diff, offset_m((table["Lat"][0], table["Lng"][0]), table["Lat"], table["Lng"]))
+    d_north = went_north - dt * (north[1:] + north[:-1]) / 2
+    d_east = went_east - dt * (east[1:] + east[:-1]) / 2
     return np.hypot(d_north, d_east), dt
 
 

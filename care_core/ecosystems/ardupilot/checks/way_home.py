@@ -18,6 +18,7 @@ from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import Span, runs, seconds_in
+from care_core.geodesy import offset_m
 from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats, quantile
 
@@ -43,7 +44,6 @@ _SURELY_LOST = LIMITS.add("probability that a mission fails of a phase far beyon
 _RTL, _LAND, _AUTO = 6, 9, 3
 """Modes of ArduCopter (ArduCopter/mode.h)."""
 _STEP_S, _OVER_S = 0.5, 2.0
-_METRES = 111319.5
 _NEAR_M, _LEFT_M, _ACCEL_MS2 = 3.0, 1.0, 2.5
 _OVER_OBSTACLES = "RTL_ALT"
 """Which height the way home needs is the site's, and no default's."""
@@ -162,9 +162,8 @@ def _way(flight: Flight, span: Span) -> _Way | None:
     there = table.between(*span)
     if len(there) < 5:
         return None
-    east = np.cos(np.radians(there["Lat"][-1])) * _METRES
-    x = np.interp(t, there.t, (there["Lat"] - there["Lat"][-1]) * _METRES)
-    y = np.interp(t, there.t, (there["Lng"] - there["Lng"][-1]) * east)
+    home = float(there["Lat"][-1]), float(there["Lng"][-1])
+    x, y = (np.interp(t, there.t, metres) for metres in offset_m(home, there["Lat"], there["Lng"]))
     h = np.interp(t, *height)
     speed = smooth(t, np.hypot(np.gradient(x, t), np.gradient(y, t)), _OVER_S)
     return _Way(t, np.hypot(x, y), h, speed, -smooth(t, np.gradient(h, t), _OVER_S))

@@ -30,14 +30,13 @@ from care_core.ecosystems.coverage import EXTREME, doubt
 from care_core.ecosystems.measures import Mission, has
 from care_core.ecosystems.vehicles.way import (
     AIRBORNE_M,
-    METRES_PER_DEGREE,
     Phase,
     RequestedMission,
     Track,
     distance_to_legs,
-    offset_m,
     phases_home,
 )
+from care_core.geodesy import METRES_PER_DEGREE, offset_m
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import Bools, Floats, known_median
 from care_core.records import Record

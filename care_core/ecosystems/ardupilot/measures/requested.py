@@ -33,7 +33,8 @@ from care_core.ecosystems.ardupilot.measures.samples import samples, whole
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.coverage import USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
-from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, number_asked, offset_m
+from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, number_asked
+from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
 from care_core.run import Unavailable, Value

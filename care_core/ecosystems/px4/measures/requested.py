@@ -14,7 +14,8 @@ import numpy as np
 
 from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
 from care_core.ecosystems.px4.flight import RESULT, RESULT_FIELDS
-from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, number_asked, offset_m
+from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, number_asked
+from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record
 from care_core.run import Unavailable, Value

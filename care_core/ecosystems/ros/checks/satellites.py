@@ -11,6 +11,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive
 from care_core.ecosystems.ros.messages import FIX, GOALS, holds, reading
 from care_core.ecosystems.spans import stretches
+from care_core.geodesy import offset_m
 from care_core.logs.base import Table
 from care_core.numbers import Bools, Floats, median
 from care_core.records import replace
@@ -21,8 +22,6 @@ JUMP_M = LIMITS.add("step beyond the way it went", 10.0, "m", "a receiver withou
 STEP_S = LIMITS.add("time between positions that are compared", 1.5, "s", "over longer ones a car may have turned")
 LIKE = int(LIMITS.add("steps that tell how it went", 5, "", "a choice: five seconds of a slow receiver"))
 SETTLES_S = LIMITS.add("time until a receiver has settled", 10.0, "s", "its first positions are of few satellites")
-_METRES = 111_320.0
-"""Of a degree of latitude."""
 _NO_FIX = 0
 """NavSatStatus: below it there is no position."""
 
@@ -68,8 +67,8 @@ def _leaps(drive: Drive, topic: str, table: Table, known: Bools) -> Iterator[Fin
     latitude, longitude = (np.asarray(table[name], np.float64)[known] for name in _PLACE)
     if len(t) < LIKE + 2:
         return
-    east = (longitude - longitude[0]) * _METRES * np.cos(np.radians(latitude[0]))
-    off = _beyond(t, east, (latitude - latitude[0]) * _METRES)
+    north, east = offset_m((latitude[0], longitude[0]), latitude, longitude)
+    off = _beyond(t, east, north)
     rows = np.flatnonzero((off > JUMP_M) & (t > t[0] + SETTLES_S))
     if len(rows):
         more = f", {len(rows)} such steps" if len(rows) > 1 else ""
