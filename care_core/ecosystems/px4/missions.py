@@ -32,6 +32,7 @@ from care_core.ecosystems.px4.measures.outcome import failsafe_s, flew_automatic
 from care_core.ecosystems.px4.measures.shortfall import evidence, shortfall
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import mode_name, way_of
+from care_core.ecosystems.vehicles.arming import CUT
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.records import replace
 from care_core.run import Check, Evidence, Unavailable, Value
@@ -42,7 +43,6 @@ _SOON_S = 1.0
 _HOVERS_S = 5.0
 """A throttle-up on a bench is over sooner."""
 _UNTOLD = Unavailable("the firmware cut its motors, and the log tells no height")
-_CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 
 
 class Px4Missions(MissionKind):
@@ -118,7 +118,7 @@ def _checks(flight: Px4Flight, span: Span, *, ended: bool) -> Iterator[Check]:
     if flies:
         landed = _on_ground(flight, span, ended=ended)
         yield Check("landed", landed, "it was on the ground at the end", "it was disarmed in the air")
-    yield Check("disarmed", 1.0 if ended else _CUT, "it was disarmed at the end")
+    yield Check("disarmed", 1.0 if ended else CUT, "it was disarmed at the end")
 
 
 def _before_kill(flight: Px4Flight, span: Span) -> Span:
@@ -200,7 +200,7 @@ def _on_ground(flight: Px4Flight, span: Span, *, ended: bool) -> Value:
     if flight.during(LANDED, "landed", span) is None:
         return Unavailable("the log does not say when it was on the ground", f"record {LANDED}", LANDED)
     if not ended:
-        return _CUT
+        return CUT
     aloft_m, before = flight.height_m(span[1]), flight.during(LANDED, "landed", (-math.inf, span[1]))
     was_aloft = before is not None and len(before) > 0 and before["landed"][-1] == 0
     if was_aloft and aloft_m is not None and aloft_m > AIRBORNE_M:

@@ -5,6 +5,12 @@ from __future__ import annotations
 from bisect import bisect
 from collections.abc import Iterable, Mapping, Sequence
 
+from care_core.run import Unavailable
+
+NEVER_ARMED = Unavailable("the vehicle never armed", "see why arming was refused")
+CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
+"""Why what only a flight, or only its end, would tell is not known."""
+
 _METHODS: Mapping[int, str] = {
     0: "by the rudder stick", 1: "by the ground station", 2: "by a switch", 3: "for a motor test", 4: "by a script",
     5: "by termination", 6: "by the CPU failsafe", 7: "by the battery failsafe", 8: "after landing",

@@ -10,7 +10,6 @@ import numpy as np
 from care_core.ecosystems.ardupilot.checks.settings import charge, supply
 from care_core.ecosystems.ardupilot.flight import as_flight
 from care_core.ecosystems.ardupilot.instances import split
-from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, span_of_phase
@@ -20,6 +19,7 @@ from care_core.ecosystems.coverage import EXTREME, SUM, Bears, Samples
 from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, has, missing
 from care_core.ecosystems.plausible import is_alive
 from care_core.ecosystems.statistic import statistic
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.run import Unavailable, Value, is_known, shown
 
@@ -57,7 +57,7 @@ def energy_used(mission: Mission, args: Args) -> Value:
     """Energy drawn between arming and disarming, or in a part of it: the monitor's counter, else voltage times current
     over time."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     span = span_of_phase(mission, args) if "phase" in args else (mission.start_s, mission.end_s)
     if isinstance(span, Unavailable):
         return span
@@ -139,7 +139,7 @@ def _known(table: Table, *fields: str) -> Table:
 def min_voltage(mission: Mission, args: Args) -> Value:
     """The lowest battery voltage between arming and disarming."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     table = mission.tables.get("BAT")
     if table is not None and has(table, "Volt") and not _has_voltage(next(iter(split("BAT", table)), table)):
         return _NO_VOLTAGE

@@ -14,6 +14,7 @@ from care_core.ecosystems.ardupilot.recorded import ErrorRecord
 from care_core.ecosystems.ardupilot.texts import Refusal, refusal_of
 from care_core.ecosystems.measures import Args, Mission, extractor, missing
 from care_core.ecosystems.vehicles import FAILSAFE, error_kind, error_words
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.logs.base import Wanted
 from care_core.run import Unavailable, Value
 from care_core.text import listed
@@ -91,9 +92,7 @@ def _arm_changes(mission: Mission) -> list[ArmChange]:
     return [change for change in changes if mission.start_s <= change.time_s <= mission.end_s]
 
 
-CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 UNRECORDED = Unavailable("the log records no arming", "set LOG_DISARMED to 1", "ARM")
-NOT_FLOWN = Unavailable("the vehicle never armed", "see why arming was refused")
 _EVENTS: Wanted = {name: NEEDS[name] for name in ("MSG", "ARM", "EV", "ERR")}
 
 
@@ -110,7 +109,7 @@ def has_event(mission: Mission, kind: str, about: str = "") -> float:
 
 def _in_flight(mission: Mission, kind: str, about: str = "") -> Value:
     """The same, for a vehicle that was armed: one that never flew shows neither."""
-    return has_event(mission, kind, about) if is_armed(mission) else NOT_FLOWN
+    return has_event(mission, kind, about) if is_armed(mission) else NEVER_ARMED
 
 
 def crash_of(mission: Mission) -> str:
@@ -186,7 +185,7 @@ def ekf_trouble(mission: Mission, args: Args) -> Value:
 def forced_disarm(mission: Mission, args: Args) -> Value:
     """1 when the operator disarmed the vehicle by force, else 0."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     is_recorded = any(change.is_forced is not None for change in _arm_changes(mission))
     return float(forced(mission)) if is_recorded else missing("ARM with Forced")
 
@@ -195,7 +194,7 @@ def forced_disarm(mission: Mission, args: Args) -> Value:
 def arming_time(mission: Mission, args: Args) -> Value:
     """Time from the first refusal of arming to the arming, 0 when it was never refused."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     flight = flight_of(mission)
     since = max((end for _, end in flight.recorded_armed if end < mission.start_s), default=-math.inf)
     refused = [one.time_s for one in flight.refusals if since < one.time_s < mission.start_s]

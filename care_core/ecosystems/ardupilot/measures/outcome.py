@@ -8,8 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.measures.events import (
-    CUT,
-    NOT_FLOWN,
     UNRECORDED,
     crash_of,
     failed,
@@ -27,6 +25,7 @@ from care_core.ecosystems.ardupilot.measures.shortfall import event_clause, land
 from care_core.ecosystems.coverage import SUM, doubt
 from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
+from care_core.ecosystems.vehicles.arming import CUT, NEVER_ARMED
 from care_core.ecosystems.vehicles.way import AIRBORNE_M
 from care_core.logs.base import Wanted
 from care_core.numbers import Floats
@@ -247,7 +246,7 @@ def mission_refused(mission: Mission) -> bool:
 def no_mission(mission: Mission, args: Args) -> Value:
     """1 when the vehicle was armed, told to begin its mission, and never did, else 0."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     return float(not flew_automatically(mission) and mission_refused(mission))
 
 

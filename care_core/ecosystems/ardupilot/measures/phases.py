@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import FlownMission, analyse
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.measures import Args, Mission, numeric, one_of
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.ecosystems.vehicles.way import span_in
 from care_core.run import Unavailable
 
@@ -21,7 +21,7 @@ PHASE_ARGS = {
 
 def flown_mission(mission: Mission) -> FlownMission | Unavailable:
     """What was flown of a mission; why nothing was."""
-    return mission.shared(analyse) if is_armed(mission) else NOT_FLOWN
+    return mission.shared(analyse) if is_armed(mission) else NEVER_ARMED
 
 
 def span_of_phase(mission: Mission, args: Args) -> tuple[float, float] | Unavailable:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from care_core.ecosystems.ardupilot.measures import rests
-from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
@@ -15,6 +14,7 @@ from care_core.ecosystems.ardupilot.measures.requested import requested_mission
 from care_core.ecosystems.coverage import EXTREME, SUM
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
 from care_core.ecosystems.statistic import statistic
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.run import Unavailable, Value
 
 
@@ -55,7 +55,7 @@ def waypoint_miss(mission: Mission, args: Args) -> Value:
 @extractor("mission_time", needs=NEEDS, unit="s")
 def mission_time(mission: Mission, args: Args) -> Value:
     """Time from arming to disarming."""
-    return mission.end_s - mission.start_s if is_armed(mission) else NOT_FLOWN
+    return mission.end_s - mission.start_s if is_armed(mission) else NEVER_ARMED
 
 
 @extractor("phase_time", needs=NEEDS, unit="s", args=PHASE_ARGS, rests_on=rests.heights_of_phase)

@@ -10,7 +10,8 @@ import numpy as np
 from care_core.ecosystems.coverage import EXTREME, SUM, USUAL, Bears, Samples
 from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, has, missing
 from care_core.ecosystems.plausible import is_alive
-from care_core.ecosystems.px4.measures.flown import NEEDS, NOT_FLOWN, PHASE_ARGS, flight_of, is_armed, span_of_phase
+from care_core.ecosystems.px4.measures.flown import NEEDS, PHASE_ARGS, flight_of, is_armed, span_of_phase
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import median
 from care_core.run import Unavailable, Value
@@ -61,7 +62,7 @@ def _measured(mission: Mission, *fields: str) -> Table | Unavailable:
 def energy_used(mission: Mission, args: Args) -> Value:
     """Energy drawn between arming and disarming, or in a part of it: voltage times current over time."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     span = span_of_phase(mission, args) if "phase" in args else (mission.start_s, mission.end_s)
     if isinstance(span, Unavailable):
         return span
@@ -83,7 +84,7 @@ def energy_used(mission: Mission, args: Args) -> Value:
 def hover_power(mission: Mission, args: Args) -> Value:
     """Median electric power in flight: what the vehicle takes to stay up, with its load."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     table = _measured(mission, "voltage_v", "current_a")
     if isinstance(table, Unavailable):
         return table
@@ -97,7 +98,7 @@ def hover_power(mission: Mission, args: Args) -> Value:
 def min_voltage(mission: Mission, args: Args) -> Value:
     """The lowest battery voltage between arming and disarming."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     table = _measured(mission, "voltage_v")
     if isinstance(table, Unavailable):
         return table
@@ -123,7 +124,7 @@ def start_voltage(mission: Mission, args: Args) -> Value:
 def least_charge(mission: Mission, args: Args) -> Value:
     """The least remaining charge that the firmware estimated between arming and disarming, 0 to 1."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     table = mission.table(BATTERY)
     if not has(table, "remaining"):
         return missing(BATTERY)

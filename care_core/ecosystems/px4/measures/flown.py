@@ -27,6 +27,7 @@ from care_core.ecosystems.px4.measures.requested import (
 )
 from care_core.ecosystems.spans import within
 from care_core.ecosystems.vehicles import way_of
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.ecosystems.vehicles.way import AIRBORNE_M, Phase, Track, distance_to_legs, phases_home, span_in
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import Floats
@@ -45,7 +46,6 @@ PHASE_ARGS = {
 }
 _SLOW_BELOW_M = 5.0
 """MPC_LAND_ALT2, as shipped: height from which a landing is slow."""
-NOT_FLOWN = Unavailable("the vehicle never armed", "see why arming was refused")
 
 
 class FlownMission(Record, eq=False):
@@ -112,7 +112,7 @@ def is_armed(mission: Mission) -> bool:
 
 def flown_mission(mission: Mission) -> FlownMission | Unavailable:
     """What was flown of a mission; why nothing was."""
-    return mission.shared(analyse) if is_armed(mission) else NOT_FLOWN
+    return mission.shared(analyse) if is_armed(mission) else NEVER_ARMED
 
 
 def span_of_phase(mission: Mission, args: Mapping[str, object]) -> tuple[float, float] | Unavailable:

@@ -11,9 +11,10 @@ from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
 from care_core.ecosystems.px4 import failsafes, upset
 from care_core.ecosystems.px4.flight import MESSAGES, RESULT, STATUS
 from care_core.ecosystems.px4.flown_mission import mission_outcome
-from care_core.ecosystems.px4.measures.flown import NEEDS, NOT_FLOWN, flight_of, flown_mission, is_armed
+from care_core.ecosystems.px4.measures.flown import NEEDS, flight_of, flown_mission, is_armed
 from care_core.ecosystems.px4.measures.route import landing_error
 from care_core.ecosystems.vehicles import mode_name, way_of
+from care_core.ecosystems.vehicles.arming import CUT, NEVER_ARMED
 from care_core.logs.base import Wanted, merge_needs
 from care_core.run import Unavailable, Value, is_known
 from care_core.text import log_time
@@ -24,7 +25,6 @@ PLACE_M = 5.0
 STRANDED_S = 60.0
 TAKEOFF_S = 120.0
 """Longer than any take-off takes: the mission does not go on."""
-CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 
 _EVENTS: Wanted = merge_needs((
     NEEDS, upset.READS, failsafes.READS, {MESSAGES: ("message",)},
@@ -126,7 +126,7 @@ _ABOUT = one_of(", ".join(failsafes.REASONS), *failsafes.REASONS)
 def failsafe(mission: Mission, args: Args) -> Value:
     """1 when a failsafe acted in flight, of what `about` names or of any kind, else 0."""
     if not is_armed(mission):
-        return NOT_FLOWN
+        return NEVER_ARMED
     about = str(args.get("about", ""))
     return float(about in reasons_of_failsafe(mission) if about else failsafe_s(mission) is not None)
 
@@ -134,7 +134,7 @@ def failsafe(mission: Mission, args: Args) -> Value:
 @extractor("px4_lost", needs=_EVENTS, unit="", rests_on=everything)
 def lost(mission: Mission, args: Args) -> Value:
     """1 when control was lost in the air, or the vehicle hit the ground at speed, else 0."""
-    return float(lost_s(mission) is not None) if is_armed(mission) else NOT_FLOWN
+    return float(lost_s(mission) is not None) if is_armed(mission) else NEVER_ARMED
 
 
 @extractor("px4_arming_refused", needs=_EVENTS, unit="")

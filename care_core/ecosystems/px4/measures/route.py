@@ -12,7 +12,6 @@ from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, mis
 from care_core.ecosystems.px4.flight import POSITION
 from care_core.ecosystems.px4.measures.flown import (
     NEEDS,
-    NOT_FLOWN,
     PHASE_ARGS,
     flight_of,
     flown_mission,
@@ -22,6 +21,7 @@ from care_core.ecosystems.px4.measures.flown import (
 from care_core.ecosystems.px4.measures.requested import ITEM, requested_mission
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.statistic import statistic
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.run import Unavailable, Value
 
 _RETURNING = ("return", "return_climb", "return_cruise", "descent", "touchdown")
@@ -60,7 +60,7 @@ def landing(mission: Mission, args: Args) -> Iterator[Samples]:
 @extractor("px4_mission_time", needs=NEEDS, unit="s")
 def mission_time(mission: Mission, args: Args) -> Value:
     """Time from arming to disarming."""
-    return mission.end_s - mission.start_s if is_armed(mission) else NOT_FLOWN
+    return mission.end_s - mission.start_s if is_armed(mission) else NEVER_ARMED
 
 
 @extractor("px4_phase_time", needs=NEEDS, unit="s", args=PHASE_ARGS, rests_on=heights_of_phase)
