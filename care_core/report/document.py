@@ -371,7 +371,10 @@ def build_document(diagnosis: Diagnosis) -> Report:
         dismissed=[publish(Dismissal, one) for one in diagnosis.dismissed],
         account=event_entries(diagnosis.health),
         findings=finding_entries(diagnosis.health),
-        hypotheses=[publish(Hypothesis, h, probability=six_digits(h.probability)) for h in diagnosis.hypotheses],
+        hypotheses=[
+            publish(Hypothesis, h, probability=six_digits(h.probability), acts=six_digits(h.acts))
+            for h in diagnosis.hypotheses
+        ],
         outside=[publish(OutsideEntry, one, usual=one.back) for one in diagnosis.outside],
         headline=verdict.headline,
         status=verdict.status,

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from care_core.diagnose.records import Fault, ObjectiveResult, ParameterChange, PathNode, Prediction, Since
+from care_core.diagnose.records import Fault, Hypothesis, ObjectiveResult, ParameterChange, PathNode, Prediction, Since
 from care_core.diagnose.since import with_evidence
 from care_core.diagnose.triage import unjudged
 from care_core.ecosystems.findings import NOTHING_SEEN
@@ -175,6 +175,12 @@ def test_a_crash_is_never_called_fine() -> None:
     assert "FAULT: motor 2" in to_text(fine)
     assert "**FAULT**: motor 2" in to_markdown(build_document(fine))
     assert "<strong>FAULT</strong>: motor 2" in to_html(build_document(fine))
+
+
+def test_what_the_model_says_of_an_explanation_has_six_digits() -> None:
+    told = (Hypothesis("parameter", "LAND_SPEED", 0.903142857142857, 0.93314285714285716),)
+    entry = build_document(replace(made_diagnosis(), hypotheses=told)).hypotheses[0]
+    assert (entry.probability, entry.acts) == (0.903143, 0.933143)
 
 
 def test_a_log_without_a_profile_tells_what_happened() -> None:
