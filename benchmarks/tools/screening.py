@@ -2,7 +2,8 @@
 
 usage: python -m benchmarks.tools.screening FOLDER VEHICLE REFERENCES
 
-FOLDER: rows.jsonl (tag, name, value, ok) and logs/TAG.*, of what was lost at least; REFERENCES: JSON, each parameter's reference
+FOLDER: rows.jsonl (tag, name, value, ok) and logs/TAG.*, of what was lost at least
+REFERENCES: JSON, each parameter's reference
 
 How a flight failed is what `care` itself reads out of its log, by the same words that a run is held against later. A
 flight of which it sees nothing wrong counts as one that was not lost.

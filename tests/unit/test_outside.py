@@ -55,11 +55,11 @@ def test_what_lost_no_flight_is_told_where_a_limit_is_missed_that_it_acts_on() -
     rover = replace(COPTER, kind="rover")
     strays = Signs(frozenset({"strays"}), frozenset({"strays"}))
     driven = {**setting("PSC_VEL_D", 1, 0), **setting("MOT_SPD_SCA_BASE", 0.1, 1)}
-    found = outside_suspects(off_parameters(driven, rover, (), None), strays, EVERYTHING, "rover")
+    found = outside_suspects(off_parameters(driven, rover, (), None), strays, EVERYTHING, "rover")  # type: ignore[arg-type]
     assert [(one.name, one.is_learned) for one in found] == [("PSC_VEL_D", False), ("MOT_SPD_SCA_BASE", False)]
     assert sum(one.weight for one in found) == pytest.approx(0.02)
     upset = Signs(frozenset({"upset"}), frozenset({"upset", "strays"}))
-    assert not outside_suspects(off_parameters(driven, rover, (), None), upset, EVERYTHING, "rover")
+    assert not outside_suspects(off_parameters(driven, rover, (), None), upset, EVERYTHING, "rover")  # type: ignore[arg-type]
 
 
 def test_a_parameter_that_nothing_knows_does_not_hide_the_first_that_is_named() -> None:

@@ -12,12 +12,13 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.held_missions import PLACES, RETURN, TAKEOFF, HeldMission
-from care_core.ecosystems.ardupilot.spans import Floats, during
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import during
 from care_core.ecosystems.vehicles import flies, way_of
 from care_core.logs.base import Wanted
+from care_core.numbers import Floats
 from care_core.run import shown
 
 READS: Wanted = {}
