@@ -1,5 +1,5 @@
 """What an operator does next. A vehicle that lost thrust, crashed or was upset does not fly the same mission again
-before it was on the bench, in a simulator or in a hover."""
+before it was on the bench, in a simulator or in a hover; one that a simulator flew has nothing to break."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from care_core.diagnose.hypotheses import first_named
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
 from care_core.diagnose.records import Diagnosis, Fix, Hypothesis, helps
+from care_core.diagnose.remedies import remedy
+from care_core.diagnose.tell_more import AGAIN
 from care_core.ecosystems.findings import (
     IDLED,
     KILLED,
@@ -19,7 +21,7 @@ from care_core.ecosystems.findings import (
     every_finding,
 )
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
-from care_core.ecosystems.vehicles import flies, vehicle_of
+from care_core.ecosystems.vehicles import flies, is_simulated, vehicle_of
 from care_core.logs.formats import MAVLINK_TLOG, format_named
 from care_core.run import Run, shown
 from care_core.text import listed
@@ -42,16 +44,18 @@ def was_upset(run: Run, findings: Iterable[Finding]) -> bool:
 
 def trial(run: Run) -> str:
     """Where what was upset is tried before it runs its mission again."""
-    is_robot, kind = format_named(run.log.format).ecosystem == "ros", vehicle_of(run.log.facts, {}).kind
+    kind = vehicle_of(run.log.facts, {}).kind
     if kind == "plane":
         return "in the simulator or on a short flight close by"
     if kind == "sub":
         return "in the simulator or in shallow water"
-    return f"in the simulator or {'a low hover' if not is_robot and flies(kind) else 'at walking pace'}"
+    return f"in the simulator or {'a low hover' if not _is_robot(run) and flies(kind) else 'at walking pace'}"
 
 
 def bench(run: Run) -> str:
     """What to do where it was upset and nothing says why."""
+    if is_simulated(run.log.facts, run.settings):
+        return "look at the simulator's model, and at the failures that were set in it, before another run"
     place = trial(run)
     parts = "motors, propellers and wiring"
     if "walking" in place:
@@ -61,6 +65,15 @@ def bench(run: Run) -> str:
     return f"check {parts} on the bench, then try it {place}, before another mission"
 
 
+def again(run: Run, *, upset: bool) -> str:
+    """How a change is tried."""
+    return f"try it {trial(run)}" if upset and not is_simulated(run.log.facts, run.settings) else AGAIN
+
+
+def _is_robot(run: Run) -> bool:
+    return format_named(run.log.format).ecosystem == "ros"
+
+
 def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
     """The next step in a sentence, empty where there is nothing to be done."""
     run, findings = diagnosis.run, diagnosis.health.findings
@@ -68,15 +81,38 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
     if diagnosis.fix is not None and not diagnosis.abstained:
         return _of_fix(diagnosis.fix, diagnosis, upset=upset)
     if has_failed and (undone := _undone(diagnosis)):
-        return f"{undone}, then try it {trial(run)}" if upset else undone
+        return f"{undone}, then {again(run, upset=upset)}" if upset else undone
     named = _named(diagnosis) if has_failed else ()
     if has_failed and upset:
         return _checked(named, findings, run)
     if named:
-        return f"look at what this names: {listed(named)}"
+        return _mended(named, findings, run)
     if has_failed and diagnosis.tell_more:
         return diagnosis.tell_more[0]
     return _without_profile(diagnosis) if diagnosis.profile.fit.verdict == "no" else ""
+
+
+def _mended(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str:
+    """What to do about the findings of these titles: of each what its kind calls for, of the others their names. In a
+    simulation no part wears out."""
+    titled = {one.title: one for one in every_finding(findings)}
+    advice: list[str] = []
+    set_to_fail: list[str] = []
+    untold: list[str] = []
+    for name in named:
+        one = titled.get(name)
+        text = "" if one is None else remedy(one, is_robot=_is_robot(run))
+        if one is not None and one.suspect == "hardware" and is_simulated(run.log.facts, run.settings):
+            set_to_fail.append(name)
+        elif text:
+            advice.append(text)
+        else:
+            untold.append(name)
+    if set_to_fail:
+        advice.append(f"look for a failure that was set in the simulator, or at its model: {listed(set_to_fail)}")
+    if untold:
+        advice.append(f"look at what this names: {listed(untold)}")
+    return "; ".join(dict.fromkeys(advice))
 
 
 def _without_profile(diagnosis: Diagnosis) -> str:
@@ -100,33 +136,33 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
     though nothing says why it did."""
     symptoms = {one.title: one.kind for one in findings if one.kind in SYMPTOMS}
     parts = [name for name in named if name not in symptoms]
-    around = {one.title for one in findings if one.kind == "blocked"}
+    then = f"; then {again(run, upset=True)}"
     if parts:
-        how = "look at what this names" if around.issuperset(parts) else "check on the bench"
-        return f"{how}: {listed(parts)}; then try it {trial(run)}"
+        return f"{_mended(parts, findings, run)}{then}"
     if any(one.title in (KILLED, STOPPED) for one in findings):
-        return f"ask why the motors were cut, and check what the fall broke; then try it {trial(run)}"
+        return f"ask why the motors were cut, and check what the fall broke{then}"
     if any(one.title in (IDLED, STEERED) for one in findings):
-        return f"look at how it was steered: its throttle stick was down; then try it {trial(run)}"
+        return f"look at how it was steered: its throttle stick was down{then}"
     swung = next((one.title for one in findings if one.kind == "tuning" and one.severity == "critical"), None)
     if swung is not None:
-        return f"look at the gains and filters of what swings ({swung}); then try it {trial(run)}"
+        return f"look at the gains and filters of what swings ({swung}){then}"
     misled = [name for name in named if symptoms[name] not in UPSETS]
-    return f"look at what this names: {listed(misled)}; then try it {trial(run)}" if misled else bench(run)
+    return f"{_mended(misled, findings, run)}{then}" if misled else bench(run)
 
 
 def _of_fix(fix: Fix, diagnosis: Diagnosis, *, upset: bool) -> str:
     """What to do with a change that can be made."""
     if fix.by_hand and not helps(fix.odds, diagnosis.odds_as_driven):
         return "leave it as driven, or choose other values"
-    again = f"try it {trial(diagnosis.run)} first" if upset else "run again"
-    return f"make the change, {again}, and check what it brought with 'care verify REPORT LOG'"
+    how = again(diagnosis.run, upset=upset)
+    tried = how if how == AGAIN else f"{how} first"
+    return f"make the change, {tried}, and check what it brought with 'care verify REPORT LOG'"
 
 
 def _named(diagnosis: Diagnosis) -> tuple[str, ...]:
     """What to look at: the part or circumstance that is likeliest, and the part that is mended before anything else."""
     part = mend_first(diagnosis.health.findings)
-    first = next(iter(diagnosis.hypotheses), None)
+    first = next((one for one in diagnosis.hypotheses if one.name), None)
     leading = first if first is not None and first.what in ("hardware", "world") else None
     if part is None:
         return (leading.name,) if leading is not None else ()
@@ -193,5 +229,5 @@ def _looked_at(name: str, diagnosis: Diagnosis) -> str:
     suspect = next((one for one in diagnosis.outside if one.name == name), None)
     is_chosen = suspect is not None and suspect.role in ("choice", "wiring")
     back = f"; 'param set {name} {shown(suspect.back)}' puts it back" if suspect is not None and is_chosen else ""
-    robot = "robot" if format_named(diagnosis.run.log.format).ecosystem == "ros" else "vehicle"
+    robot = "robot" if _is_robot(diagnosis.run) else "vehicle"
     return f"check whether {name}{value} is right for this {robot}{back}"

@@ -64,8 +64,7 @@ def tell_more(
         nothing_else: what is left to be done where nothing of this would help.
         all_back: everything at its reference, where that promises more than what is advised.
     """
-    advice = [*([] if run.config else [TELL]), *([] if all_back is None else [all_back.told(again)])]
-    advice += _unrecorded(faults, run)
+    advice = [*([] if all_back is None else [all_back.told(again)]), *to_record(faults, run)]
     for fault in faults:
         objective = fault.objective.variable.name
         advice += [
@@ -85,6 +84,11 @@ def tell_more(
     if not advice:
         advice.append(nothing_else)
     return tuple(dict.fromkeys(advice))
+
+
+def to_record(faults: Sequence[Fault], run: Run) -> tuple[str, ...]:
+    """The sentences that call for no other run: where a part is mended first, nothing runs again before."""
+    return tuple(dict.fromkeys([*([] if run.config else [TELL]), *_unrecorded(faults, run)]))
 
 
 def _change_back(query: CounterfactualQuery, name: str) -> str:

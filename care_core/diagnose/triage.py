@@ -24,7 +24,7 @@ from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.failed_run import FailedRun
 from care_core.diagnose.hypotheses import hypotheses_of, speaking, unasked
 from care_core.diagnose.judging import Judged, check_wishes, query_of
-from care_core.diagnose.next_step import bench, trial, was_upset
+from care_core.diagnose.next_step import again, bench, was_upset
 from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.outside.change import check_first, leading_outside, shown_fix
 from care_core.diagnose.parts import unmended
@@ -32,9 +32,9 @@ from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult, OutsideSuspect
 from care_core.diagnose.remarks import notes_of, reference_of
 from care_core.diagnose.since import compare, with_evidence
-from care_core.diagnose.tell_more import AGAIN, SAME_AGAIN, AllBack, tell_more
+from care_core.diagnose.tell_more import SAME_AGAIN, AllBack, tell_more, to_record
 from care_core.diagnose.unexplained import out_of_reach, refused_otherwise
-from care_core.diagnose.worth import explained, outweighed, promised_causes
+from care_core.diagnose.worth import LOOK_FIRST, explained, outweighed, promised_causes
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
@@ -125,12 +125,14 @@ def diagnose(
     beyond = next(filter(None, unheard.values()), None)
     part = part_first(failed, health.findings)
     lead = leading_outside(hypotheses, outside, health.findings, run)
+    is_part_first = False
     if lead is not None and (part is None or lead.is_found):
         advised = of_outside(lead, failed, hypotheses, promise)
     else:
         lead = None
         failed_part = part and unmended(part, likelier_than(part, hypotheses, failed))
         against = failed_part or outweighed(hypotheses, health.findings)
+        is_part_first = bool(failed_part) or (against or "").endswith(LOOK_FIRST)
         options = {s.option for group in found.values() for s in group}
         advised = of_options(failed, judged, faults, hypotheses, options, promise, against, beyond)
     advised = with_refusals(advised, failed, promise)
@@ -140,6 +142,10 @@ def diagnose(
         faults = tuple(replace(fault, causes=as_in_fix(failed, fault, fixes[0])) for fault in faults)
     faults = as_ranked(promised_causes(faults, promise), failure, UNSURE if lead is not None else 0.0)
     advised_odds = as_driven if abstained or fixes[0].odds is None else fixes[0].odds
+    told_more: tuple[str, ...] = ()
+    if unsure and not beyond:
+        everything = all_back(failed, promise, advised_odds)
+        told_more = to_record(faults, run) if is_part_first else _tell_more(failed, faults, health, everything)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
@@ -154,9 +160,7 @@ def diagnose(
         notes=notes_of(failed, broken, None if abstained or lead else fixes[0], as_driven),
         missions=judged.missions,
         rivals=circumstances(run, query, schema) if unsure else (),
-        tell_more=_tell_more(failed, faults, health, all_back(failed, promise, advised_odds))
-        if unsure and not beyond
-        else (),
+        tell_more=told_more,
         health=health,
         hypotheses=hypotheses,
         failure=failure,
@@ -220,7 +224,7 @@ def _tell_more(
         failed.run,
         failed.unranked,
         observational=failed.profile.schema.observational,
-        again=f"try it {trial(failed.run)}" if upset else AGAIN,
+        again=again(failed.run, upset=upset),
         nothing_else=bench(failed.run) if upset else SAME_AGAIN,
         all_back=everything,
     )

@@ -24,6 +24,8 @@ MOST_RUNS = 10
 
 LITTLE = 0.5
 """Share of its cause's probability below which what a change adds has to be explained."""
+LOOK_FIRST = "look at it first"
+"""How it is said that something is looked at before any parameter is changed."""
 ALIKE = 0.02
 """Shares of a limit that are no difference to an operator."""
 
@@ -85,7 +87,7 @@ def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = (
         )
     if any(one.title == rival.name and one.kind in SYMPTOMS for one in findings):
         return f"{rival.name}, and neither this log nor training says why"
-    return f"{rival.name}; that explains this failure better than any parameter: look at it first"
+    return f"{rival.name}; that explains this failure better than any parameter: {LOOK_FIRST}"
 
 
 def nearest(fixes: Sequence[Fix], broken: Sequence[ObjectiveResult]) -> Fix | None:

@@ -27,7 +27,7 @@ from care_core.report.document import build_document, remembered_verdict
 from care_core.report.reading import remembered
 from care_core.report.terminal import to_text
 from care_core.report.writers import published
-from care_core.run import Check, Damage, Evidence
+from care_core.run import Check, Damage, Evidence, Setting
 from tests.made import made_diagnosis, made_run
 
 AGAIN = "run the same configuration again: if it fails again, the cause persists"
@@ -66,9 +66,49 @@ def test_what_was_not_upset_runs_again() -> None:
 
 
 def test_a_part_that_failed_is_what_to_look_at_whatever_explains_more() -> None:
-    assert next_step(failed(THRUST), has_failed=True).startswith("check on the bench: too little thrust; then try it")
+    said = next_step(failed(THRUST), has_failed=True)
+    assert said.startswith("check the propellers, motors and the battery under load")
+    assert said.endswith("; then try it in the simulator or a low hover")
     laser = Finding("laser", "the laser falls silent", 50.0, 60.0, "critical", "", "", probability=0.9)
-    assert next_step(failed(laser), has_failed=True) == "look at what this names: the laser falls silent"
+    said = next_step(failed(laser), has_failed=True)
+    assert said == "check the laser's cable and supply, and its driver's log"
+
+
+@pytest.mark.parametrize(
+    ("kind", "title", "told"),
+    [
+        ("motor", "motor 4 (rear right) gave no thrust", "check motor 4 (rear right): its propeller, ESC"),
+        ("surface", "the elevator is at the stop, and the pitch does not follow", "check the elevator: servo"),
+        ("gps", "only 5 satellites", "wait under open sky for more satellites before arming"),
+        ("gps", "the GPS position jumps by 28 m", "look at the GPS antenna: its view of the sky"),
+        ("vibration", "strong vibration (51 m/s^2)", "balance or change the propellers"),
+        ("drive", "the drive does not answer its commands", "check the emergency stop, the motor driver's fault light"),
+        ("localisation", "odometry drifts: its position and its speed disagree", "check wheel radius"),
+        ("software", "bt_navigator: it ended", "look at what this names: bt_navigator: it ended"),
+    ],
+)
+def test_each_kind_of_finding_has_an_advice_of_its_own(kind: FindingKind, title: str, told: str) -> None:
+    part = Finding(kind, title, 50.0, 60.0, "critical", "", "", probability=0.9)
+    assert next_step(failed(part), has_failed=True).startswith(told)
+
+
+def test_in_a_simulation_no_part_is_mended_and_no_hover_comes_first() -> None:
+    part = Finding("motor", "motor 4 gave no thrust", 50.0, 60.0, "critical", "", "", probability=0.9)
+    made, fixed = failed(part), failed(part, fixed=True)
+    settings = {**made.run.settings, "SIM_ENGINE_FAIL": Setting("SIM_ENGINE_FAIL", 8.0, "the log")}
+    simulated = replace(made.run, settings=settings)
+    said = next_step(replace(made, run=simulated), has_failed=True)
+    assert said.endswith("was set in the simulator, or at its model: motor 4 gave no thrust; then run again")
+    assert "make the change, run again, and" in next_step(replace(fixed, run=simulated), has_failed=True)
+    board = replace(made.run, settings=settings, log=replace(made.run.log, facts={"stack": "PX4", "hardware": "V5"}))
+    assert "low hover" in next_step(replace(made, run=board), has_failed=True)
+
+
+@pytest.mark.parametrize("sample", ["arduplane_elevator.BIN", "nav2_stall.mcap"])
+def test_what_is_mended_first_does_not_run_again_before(sample: str) -> None:
+    diagnosis = care_core.triage(bundled("samples", sample)).diagnosis
+    assert diagnosis.abstained
+    assert diagnosis.tell_more == ()
 
 
 def test_telemetry_of_a_px4_vehicle_is_no_log_of_it() -> None:
@@ -139,7 +179,7 @@ def test_what_holds_a_vehicle_is_not_on_the_bench() -> None:
     held = Finding("blocked", "something holds it", 40.0, 60.0, "critical", "", "", probability=0.9, suspect="world")
     crashed = Finding("crash", "it crashed", 60.0, 60.0, "critical", "", "", probability=0.1)
     named = replace(failed(held, crashed), hypotheses=(Hypothesis("world", held.title, 0.9),))
-    assert next_step(named, has_failed=True).startswith("look at what this names: something holds it; then try it")
+    assert next_step(named, has_failed=True).startswith("free it, and look at what it is caught on; then try it")
 
 
 def test_a_symptom_is_no_part_to_check() -> None:
@@ -163,7 +203,7 @@ def test_a_battery_that_held_comes_after_what_ended_the_run(severity: Severity, 
     ended = replace(failed(*told), hypotheses=(Hypothesis("hardware", link.title, 0.8),))
     assert (next_step(ended, has_failed=True) == "charge or replace the battery") is is_pack
     if not is_pack:
-        assert "the radio link was lost" in next_step(ended, has_failed=True)
+        assert "check the link's antennas and range" in next_step(ended, has_failed=True)
 
 
 def test_where_nothing_failed_no_part_is_named() -> None:
@@ -197,7 +237,7 @@ def test_of_two_motors_that_were_switched_off_both_are_switched_on() -> None:
 
 def test_a_change_that_was_chosen_by_hand_does_not_come_before_what_failed() -> None:
     chosen = replace(failed(THRUST, fixed=True), abstained="too little thrust: nothing is changed until that is mended")
-    assert next_step(chosen, has_failed=True).startswith("check on the bench: too little thrust; then try it")
+    assert next_step(chosen, has_failed=True).startswith("check the propellers, motors and the battery under load")
     assert "no change is advised: too little thrust" in str(verdict_of(chosen).advice)
 
 

@@ -20,9 +20,8 @@ from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded, recorded
 from care_core.ecosystems.ardupilot.texts import Refusal, in_full, refusal_of
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.plausible import sound as without_nonsense
-from care_core.ecosystems.vehicles import Kind, Vehicle, Way, mode_name, mode_number, vehicle_of, way_of
+from care_core.ecosystems.vehicles import Kind, Vehicle, Way, is_simulated, mode_name, mode_number, vehicle_of, way_of
 from care_core.ecosystems.vehicles.modes import px4_mode
-from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
 from care_core.logs import formats
 from care_core.logs.base import Log, Table, Wanted
 from care_core.run import Setting
@@ -168,8 +167,8 @@ class Recorded(RunModel):
 
     @property
     def is_simulated(self) -> bool:
-        """Whether ArduPilot's simulator wrote the log: only its builds have parameters of the simulation."""
-        return any(name.startswith(SIMULATOR_PREFIX) for name in self.settings)
+        """Whether ArduPilot's simulator wrote the log."""
+        return is_simulated(self.log.facts, self.settings)
 
     @property
     def is_copter(self) -> bool:

@@ -16,7 +16,15 @@ from care_core.ecosystems.vehicles.motors import (
     switched_off,
 )
 from care_core.ecosystems.vehicles.self_written import is_self_written
-from care_core.ecosystems.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of, vehicle_of_run
+from care_core.ecosystems.vehicles.vehicle import (
+    UNLIKE_ROVERS,
+    Kind,
+    Vehicle,
+    flies,
+    is_simulated,
+    vehicle_of,
+    vehicle_of_run,
+)
 from care_core.metadata.aliases import ParameterAlias, alias_in, aliases_of, renamed
 
 __all__ = [
@@ -35,6 +43,7 @@ __all__ = [
     "flies",
     "is_over",
     "is_self_written",
+    "is_simulated",
     "is_skid_steered",
     "method_words",
     "mode_name",

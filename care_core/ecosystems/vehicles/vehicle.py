@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Literal
 
 from care_core.ecosystems.vehicles.frames import CLASSES, TYPES, frame_of
+from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
 from care_core.ecosystems.vehicles.settings import Driven, code
 from care_core.records import Record
 from care_core.run import Run
@@ -54,6 +55,14 @@ _GROUNDED = frozenset(("rover", "sub", "tracker"))
 def flies(kind: Kind) -> bool:
     """Whether a vehicle leaves the ground; one that is unknown may."""
     return kind not in _GROUNDED
+
+
+def is_simulated(facts: Mapping[str, str], settings: Driven) -> bool:
+    """Whether the log says that a simulator flew it: only ArduPilot's builds of it have parameters of the simulation,
+    and PX4's name themselves as the hardware. A board with PX4 has some of those parameters, too."""
+    if facts.get("stack") == "PX4":
+        return "SITL" in facts.get("hardware", "")
+    return any(name.startswith(SIMULATOR_PREFIX) for name in settings)
 
 
 class Vehicle(Record):
