@@ -85,6 +85,8 @@ class Evidence(Record):
     """What the message means, where the profile knows it."""
     circumstance: str | None = None
     """What the run met, where the message speaks of no parameter."""
+    is_concluded: bool = False
+    """Whether this program says so, and no message of the robot does."""
 
     def __str__(self) -> str:
         meaning = f" ({self.says})" if self.says else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from care_core.causal.model import EffectRecord
 from care_core.diagnose.failed_run import FailedRun
@@ -11,7 +11,7 @@ from care_core.diagnose.noisy_or import NoisyOr
 from care_core.diagnose.ranking import Suspect, describe_path, not_ruled_out
 from care_core.diagnose.records import Cause, Confidence, Fault, Fix, Note, ObjectiveResult
 from care_core.records import replace
-from care_core.run import gathered
+from care_core.run import Evidence, gathered
 
 MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
@@ -150,8 +150,15 @@ def _cause_notes(failed: FailedRun, suspect: Suspect, in_support: bool, support:
         notes.append(Note("pinned by --keep: not changed"))
     notes += map(Note, change_notes(failed.profile.schema.variables[suspect.option]))
     speaking = (evidence for evidence in failed.run.evidence if suspect.option in evidence.options)
-    notes += [Note(str(evidence), "in_the_log") for evidence in gathered(speaking)]
-    return tuple(notes)
+    return (*notes, *_said(gathered(speaking)))
+
+
+def _said(evidence: Iterable[Evidence]) -> Iterator[Note]:
+    """What this run says of an option; what it means once, however many messages mean it."""
+    told: set[str] = set()
+    for one in evidence:
+        yield Note(str(replace(one, says="") if one.says in told else one), "in_the_log")
+        told.add(one.says)
 
 
 def _chosen_by_operators(effect: EffectRecord | None) -> str:

@@ -68,8 +68,9 @@ def speaking(findings: Iterable[Finding], schema: Schema, config: Mapping[str, f
     said = {}
     for finding in filter(set_wrong, findings):
         kind = "found" if finding.severity == "critical" else "noticed"
-        evidence = Evidence(finding.onset_s, f"{finding.title}: {finding.evidence}", kind)
-        said[finding.title] = schema.pointed(evidence, config)
+        evidence = Evidence(finding.onset_s, f"{finding.title}: {finding.evidence}", kind, is_concluded=True)
+        # its numbers stand with the findings
+        said[finding.title] = replace(schema.pointed(evidence, config), text=finding.title)
     return {title: evidence for title, evidence in said.items() if evidence.options}
 
 

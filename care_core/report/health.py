@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
@@ -16,6 +17,8 @@ EVENTS_SHOWN = 24
 LED_TO_SHOWN = 4
 REASONS_SHOWN = 4
 
+_QUOTED = re.compile(r'[A-Z]+ "(?P<text>.+)"')
+
 E = TypeVar("E", bound="Event | EventEntry")
 
 
@@ -23,7 +26,8 @@ def finding_sentence(finding: FindingEntry) -> str:
     """A finding of a document with its numbers and what is folded under it."""
     late = ", after it was down" if finding.after_impact else ""
     led = "".join(f" {words.capitalize()}: {'; '.join(one.title for one in below)}." for words, below in finding.links)
-    return f"{finding.title}, at {log_time(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
+    shown_by = _beyond_title(finding).rstrip(".")
+    return f"{finding.title}, at {log_time(finding.onset_s)}{late}.{f' {shown_by}.' if shown_by else ''}{led}"
 
 
 def account_lines(account: Sequence[Event | EventEntry], robot: str = "", most: int = EVENTS_SHOWN) -> Iterator[str]:
@@ -64,9 +68,18 @@ def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
         late = ", after it was down" if finding.after_impact else ""
         head = f"  {SEVERITY_WORDS[finding.severity]:<8}  "
         yield from wrapped(f"{finding.title}, at {log_time(finding.onset_s)}{late}", head)
-        if finding.evidence:
-            yield from wrapped(finding.evidence, " " * len(head))
+        if shown_by := _beyond_title(finding):
+            yield from wrapped(shown_by, " " * len(head))
         yield from _folded(finding, " " * len(head))
+
+
+def _beyond_title(finding: Finding | FindingEntry) -> str:
+    """What shows it, without what its title says already: a refusal, or a message, is its own evidence."""
+    quoted = _QUOTED.fullmatch(finding.evidence)
+    if quoted and finding.title.endswith(quoted["text"]):
+        return ""
+    first, _, rest = finding.evidence.partition("; ")
+    return rest if finding.title.endswith(f": {first}") else finding.evidence
 
 
 def _folded(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -10,14 +11,19 @@ from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
-from care_core.report.health import account_lines, finding_lines, reason_lines
+from care_core.report.health import EVENTS_SHOWN, account_lines, finding_lines, reason_lines, telling
 from care_core.report.shared_causes import together
-from care_core.run import Value, gathered, is_known, place_of_damage
-from care_core.text import listed, log_time, log_times, wrapped
+from care_core.run import Evidence, Value, gathered, is_known, place_of_damage
+from care_core.text import but_for_numbers, listed, log_time, log_times, percent, wrapped
 from care_core.variables import Variable
 
 EVIDENCE_SHOWN = 5
+BEGINNING = 60
+"""Letters by which a message is known again: what happened shortens it."""
+_HOW_OFTEN = re.compile(r" \(\d+ times\)$")
 DAMAGE_SHOWN = 5
+UNLIKELY = 0.05
+"""Probability that a cause acted below which it has its name alone: its paths would hide those that may matter."""
 CHANGES_SHOWN = 20
 """Of parameters that are no options of the profile; the options are all shown."""
 
@@ -33,7 +39,7 @@ def to_text(diagnosis: Diagnosis) -> str:
         _origin(diagnosis),
         _missions(diagnosis),
         _objectives(diagnosis),
-        *(_causes(faults, diagnosis.odds_as_driven) for faults in _explained(diagnosis)),
+        *(_causes(faults, diagnosis) for faults in _explained(diagnosis)),
         _fix(diagnosis),
         _evidence(diagnosis),
         _since(diagnosis),
@@ -110,17 +116,30 @@ def _paths(fault: Fault) -> list[list[str]]:
     return [[node.name for node in cause.path] for cause in fault.causes]
 
 
-def _causes(faults: Sequence[Fault], as_driven: float | None) -> Iterator[str]:
+def _causes(faults: Sequence[Fault], diagnosis: Diagnosis) -> Iterator[str]:
     yield from wrapped(f"Causes of {listed([fault.objective.variable.name for fault in faults])}")
     fault = faults[-1]
-    shown = [cause for cause in fault.causes if not cause.is_lead]
-    if not shown:
+    named = [cause for cause in fault.causes if not cause.is_lead]
+    shown = [cause for cause in named if not _is_unlikely(cause, diagnosis)]
+    if not named:
         yield "  none is likely among the parameters of the profile"
     for cause in shown:
-        yield from _cause(cause, as_driven)
+        yield from _cause(cause, diagnosis.odds_as_driven)
+    if unlikely := [cause.option.name for cause in named if cause not in shown]:
+        yield from wrapped(
+            f"{'others ' if shown else ''}below {percent(UNLIKELY)}: {', '.join(unlikely)}", "  ", "    "
+        )
     leads = [f"{c.option.name} ({c.option.driven(c.current, c.is_assumed)})" for c in fault.causes if c.is_lead]
     if leads:
         yield from wrapped(f"not ruled out: {', '.join(leads)}", "  ", "    ")
+
+
+def _is_unlikely(cause: Cause, diagnosis: Diagnosis) -> bool:
+    """Whether a cause hardly acted and nothing is to be changed of it; where nothing weighs the causes, none is."""
+    changed = {change.option.name for fix in (diagnosis.fix, *diagnosis.alternatives) if fix for change in fix.changes}
+    acts = {one.name: one.acts for one in diagnosis.hypotheses if one.what == "parameter"}
+    is_weighed = bool(diagnosis.hypotheses)
+    return is_weighed and cause.option.name not in changed and acts.get(cause.option.name, 0.0) < UNLIKELY
 
 
 def _cause(cause: Cause, as_driven: float | None) -> Iterator[str]:
@@ -193,7 +212,7 @@ def _prediction(objective: Variable, fix: Fix, had: Mapping[str, Value]) -> str:
 
 
 def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
-    evidence = gathered(diagnosis.run.evidence)
+    evidence = _untold(diagnosis)
     if not evidence or not diagnosis.faults:
         return
     yield "Messages of this run"
@@ -202,6 +221,20 @@ def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
         says = f": {item.says}" if item.says else ""
         points = f" (points at {', '.join(item.options)})" if item.options else ""
         yield from wrapped(f"{item.text}{says}{points}", f"  {time:>9}  ")
+
+
+def _untold(diagnosis: Diagnosis) -> list[Evidence]:
+    """The robot's own messages that stand nowhere above: not in what happened, and not beside a cause."""
+    happened = [but_for_numbers(one.text) for one in telling(diagnosis.health.timeline, EVENTS_SHOWN)]
+    shown = (c for fault in diagnosis.faults for c in fault.causes if not c.is_lead and not _is_unlikely(c, diagnosis))
+    named = {cause.option.name for cause in shown}
+    own = (one for one in diagnosis.run.evidence if not one.is_concluded and named.isdisjoint(one.options))
+    return list(gathered(one for one in own if not any(_start(one.text) in event for event in happened)))
+
+
+def _start(message: str) -> str:
+    """As much of a message as what happened tells of a long one, without how often it came."""
+    return but_for_numbers(_HOW_OFTEN.sub("", message))[:BEGINNING]
 
 
 def _rivals(diagnosis: Diagnosis) -> Iterator[str]:

@@ -201,7 +201,7 @@ def test_recoveries_and_failures_of_the_behavior_tree() -> None:
     assert value("tree_count", one, node="FollowPath") == 1.0
     assert value("tree_count", one, node="ComputePathToPose") == 0.0
     assert [e.text for e in KIND.evidence(one)] == [
-        "recovery behavior ClearLocalCostmap-Context", "recovery behavior Spin", "recovery behavior BackUp",
+        "recovery ClearLocalCostmap-Context", "recovery Spin", "recovery BackUp",
     ]  # fmt: skip
     unknown = value("recoveries", mission(drive()))
     assert isinstance(unknown, Unavailable)

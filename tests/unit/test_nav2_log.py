@@ -42,7 +42,7 @@ def test_a_recorded_nav2_drive(tmp_path: Path, plugin: StoragePlugin) -> None:
     assert run.mission.fits
     assert run.sources == {"max_vel_x": f"{params}:1"}
     assert [one.text for one in run.evidence] == [
-        "recovery behavior Spin",
+        "recovery Spin",
         "controller_server: Failed to make progress",
     ]
     assert write_params(run.settings, format_for(log.format.name, run.settings)) == (

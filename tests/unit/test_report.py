@@ -12,10 +12,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from care_core.diagnose.records import Fault, Hypothesis, ObjectiveResult, ParameterChange, PathNode, Prediction, Since
+from care_core.diagnose.records import (
+    Fault,
+    Hypothesis,
+    ObjectiveResult,
+    ParameterChange,
+    PathNode,
+    Prediction,
+    Since,
+)
 from care_core.diagnose.since import with_evidence
 from care_core.diagnose.triage import unjudged
-from care_core.ecosystems.findings import NOTHING_SEEN
+from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding
 from care_core.errors import UsageError
 from care_core.files import write_atomically
 from care_core.records import replace
@@ -24,7 +32,7 @@ from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
 from care_core.report.writers import to_json, to_yaml
-from care_core.run import Damage, Fit, ProfileChoice
+from care_core.run import Damage, Evidence, Fit, ProfileChoice
 from care_core.text import clean
 from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis
 
@@ -148,6 +156,42 @@ def test_faults_that_move_together_are_shown_once_and_others_apart() -> None:
         assert [line[10:] for line in text.splitlines() if line.startswith("Causes of ")] == headings
         assert to_markdown(document).count("## Causes of") == to_html(document).count("<h2>Causes of") == len(headings)
         assert [fault.objective for fault in document.faults] == ["mission_time", "energy"]
+
+
+def test_a_cause_that_hardly_acted_is_named_and_no_more() -> None:
+    made = made_diagnosis()
+    told = replace(made, fix=None, alternatives=(), hypotheses=(Hypothesis("parameter", "land_speed", 0.04, 0.04),))
+    text = to_text(told)
+    assert "Causes of mission_time\n  below 5%: land_speed\n" in text
+    assert "land_speed -> land_time" not in text
+    likely = replace(told, hypotheses=(Hypothesis("parameter", "land_speed", 0.03, 0.2),))
+    assert "land_speed -> land_time" in to_text(likely)
+    assert build_document(told).faults == build_document(likely).faults
+
+
+def test_a_message_that_stands_elsewhere_is_not_repeated() -> None:
+    made = made_diagnosis()
+    happened = Event(60.0, "error", "WARN /move_base: Rotation cmd in collision (30 times, until 67.5 s)", "/rosout")
+    evidence = (
+        Evidence(60.0, "Rotation cmd in collision (30 times)", "planner"),
+        Evidence(67.0, "goal 1 aborted after 15 s", "abort", is_concluded=True),
+        Evidence(68.0, "Thrust loss", "thrust", ("land_speed",), "the motors were at their limit"),
+    )
+    health = replace(made.health, timeline=(happened,))
+    told = replace(made, run=replace(made.run, evidence=evidence), health=health)
+    assert "Messages of this run" not in to_text(told)
+    alone = replace(told, health=replace(health, timeline=()))
+    assert to_text(alone).count("Rotation cmd in collision (30 times)") == 1
+    assert "goal 1 aborted" not in to_text(alone)
+    assert len(build_document(told).evidence) == len(evidence)
+
+
+def test_a_refusal_is_no_evidence_of_itself() -> None:
+    made = made_diagnosis()
+    why = "AHRS: waiting for home"
+    refused = Finding("prearm", f"arming was refused: {why}", 1.0, 9.0, "critical", f"{why}; A is 2 (default 1)", "MSG")
+    text = to_text(replace(made, health=replace(made.health, findings=(refused,))))
+    assert "            A is 2 (default 1)\n" in text
 
 
 def test_alternatives_are_offered_with_their_probability() -> None:

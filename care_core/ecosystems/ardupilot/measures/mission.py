@@ -84,7 +84,7 @@ class ArduPilotFlight(MissionKind):
             if kind and code and kind not in spoken:
                 found.append(Evidence(t, f"ERR: {error_words(subsystem, code, flight_of(mission).mode_kind)}", kind))
         if forced(mission):
-            found.append(Evidence(mission.end_s, "Disarmed by force in flight", "forced"))
+            found.append(Evidence(mission.end_s, "Disarmed by force in flight", "forced", is_concluded=True))
         return tuple(sorted(found, key=lambda one: one.time_s))
 
     def shortfall(self, mission: Mission) -> tuple[str, ...]:

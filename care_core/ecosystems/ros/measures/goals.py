@@ -181,17 +181,21 @@ def _failed_goals(mission: Mission) -> Iterator[Evidence]:
         why = f": {goal.text}" if goal.text else ""
         if goal.status in FAILED:
             word = Status(goal.status).name.lower().replace("_", " ")
-            yield Evidence(goal.end_s, f"goal {number} {word} after {goal.time_s:.0f} s{why}", "abort")
+            yield _concluded(goal.end_s, f"goal {number} {word} after {goal.time_s:.0f} s{why}", "abort")
         elif goal.time_s > drive.timeout_s:
-            yield Evidence(goal.end_s, f"goal {number} not reached within {drive.timeout_s:.0f} s{why}", "timeout")
+            yield _concluded(goal.end_s, f"goal {number} not reached within {drive.timeout_s:.0f} s{why}", "timeout")
         elif goal.status in (Status.PREEMPTED, Status.RECALLED):
-            yield Evidence(goal.end_s, f"goal {number} cancelled after {goal.time_s:.0f} s{why}", "cancel")
+            yield _concluded(goal.end_s, f"goal {number} cancelled after {goal.time_s:.0f} s{why}", "cancel")
+
+
+def _concluded(time_s: float, text: str, kind: str) -> Evidence:
+    return Evidence(time_s, text, kind, is_concluded=True)
 
 
 def _recoveries(mission: Mission) -> Iterator[Evidence]:
     ran = goal_server(mission.spec).recoveries(mission)
     if not isinstance(ran, Unavailable):
-        yield from _condensed([(time_s, f"recovery behavior {name}", "recovery") for time_s, name in ran])
+        yield from _condensed([(time_s, f"recovery {name}", "recovery") for time_s, name in ran])
 
 
 def _stuck(mission: Mission) -> Iterator[Evidence]:
@@ -205,7 +209,7 @@ def _stuck(mission: Mission) -> Iterator[Evidence]:
         if still_s < _STUCK_S or goal.reached(drive.timeout_s):
             continue
         text = f"made no way for {still_s:.0f} s on goal {number + 1}{_commanded(drive.commands, goal)}"
-        yield Evidence(goal.end_s, text, "stuck")
+        yield _concluded(goal.end_s, text, "stuck")
 
 
 def _commanded(commands: ActiveCommands | None, goal: Goal) -> str:
