@@ -203,6 +203,23 @@ def test_a_control_loop_at_a_tenth_of_its_rate_is_a_finding(tmp_path: Path, text
     assert serious == ([title] if title else [])
 
 
+def test_a_loop_is_slow_where_it_misses_its_rate_for_long(tmp_path: Path) -> None:
+    text = "Control loop missed its desired rate of 20.0000 Hz. Current loop rate is {} Hz."
+    kept = [(10.0 + n, WARN, "controller_server", text.format(rate)) for n, rate in enumerate(["20.0000", "inf"] * 8)]
+    begins = [(20.0 + n / 10, WARN, "controller_server", text.format(rate)) for n, rate in enumerate((9.0, 5.0, 8.0))]
+    lasts = [(20.0 + 2 * n, WARN, "controller_server", text.format(8.0 + n)) for n in range(8)]
+    notes = {"none": kept, "a moment": [*kept, *begins], "long": [*kept, *lasts]}
+    told = {name: looked_at(Drive(said=said), tmp_path) for name, said in notes.items()}
+    found = {name: [one.evidence for one in health.findings] for name, health in told.items()}
+    slow = "8 messages from controller_server of less than its rate, the lowest 8 of 20 Hz"
+    assert found == {"none": [], "a moment": [], "long": [slow]}
+    said = {name: [e.text for e in health.timeline if "Control loop" in e.text] for name, health in told.items()}
+    assert said["none"] == []
+    assert [text.partition("rate is ")[2] for text in said["a moment"]] == [
+        "5.0 Hz. (3 times, until 20.2 s, this the lowest)"
+    ]
+
+
 def test_the_account_tells_goals_and_groups_messages(tmp_path: Path) -> None:
     said = [(10.0 + n, WARN, "local_costmap", f"Map update took {n}.5 seconds") for n in range(20)]
     health = looked_at(Drive(outcome=ABORTED, said=said), tmp_path)

@@ -37,11 +37,11 @@ ROSOUT_TOPICS = ("/rosout", "/rosout_agg")
 PARTS = {0: "OK", 1: "WARN", 2: "ERROR", 3: "STALE"}
 """Levels of diagnostic_msgs/DiagnosticStatus."""
 
-_RATES = re.compile(r"missed its desired rate of ([\d.]+\d) ?Hz.*current loop rate is ([\d.]+\d) ?Hz", re.IGNORECASE)
-_CONTROL = re.compile(r"control loop", re.IGNORECASE)
-_TOOK = re.compile(
-    r"control loop missed its desired rate of ([\d.]+\d) ?Hz.*loop actually took ([\d.]+\d) ?second", re.IGNORECASE
+_RATES = re.compile(
+    r"missed its desired rate of ([\d.]+\d) ?Hz.*current loop rate is ([\d.]+\d|inf) ?Hz", re.IGNORECASE
 )
+_CONTROL = re.compile(r"control loop", re.IGNORECASE)
+_TOOK = re.compile(r"missed its desired rate of ([\d.]+\d) ?Hz.*loop actually took ([\d.]+\d) ?second", re.IGNORECASE)
 _RATE_KEPT = 0.95
 """What Nav2 says of a loop that missed its rate, and from which share of it on it kept it."""
 
@@ -89,15 +89,20 @@ def kept_its_rate(text: str) -> bool:
     Nav2 sleeps by the computer's clock and measures by the node's: in a simulation that runs ahead of real time every
     cycle is late by the one and in time by the other.
     """
-    found = _RATES.search(text)
-    return found is not None and float(found[2]) >= _RATE_KEPT * float(found[1])
+    told = loop_rate(text)
+    return told is not None and told[0] >= _RATE_KEPT * told[1]
 
 
 def control_rate(text: str) -> tuple[float, float] | None:
-    """The rate at which a control loop ran and the one that it is to have, as it says itself (Nav2, move_base)."""
+    """The same of a control loop alone."""
+    return loop_rate(text) if _CONTROL.search(text) else None
+
+
+def loop_rate(text: str) -> tuple[float, float] | None:
+    """The rate at which a loop ran and the one that it is to have, as it says itself (Nav2, move_base)."""
     found = _RATES.search(text)
     if found is not None:
-        return (float(found[2]), float(found[1])) if _CONTROL.search(text) else None
+        return float(found[2]), float(found[1])
     took = _TOOK.search(text)
     return (1.0 / float(took[2]), float(took[1])) if took is not None and float(took[2]) > 0 else None
 

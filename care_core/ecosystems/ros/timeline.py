@@ -33,7 +33,7 @@ from care_core.ecosystems.ros.messages import (
     type_of,
 )
 from care_core.ecosystems.ros.motion import Odometry
-from care_core.ecosystems.ros.node_messages import Level, LogMessage, level_word
+from care_core.ecosystems.ros.node_messages import Level, LogMessage, kept_its_rate, level_word, loop_rate
 from care_core.ecosystems.ros.other_robots import other_goals
 from care_core.ecosystems.ros.recoveries import announced, repairs
 from care_core.ecosystems.timeline import counted
@@ -135,17 +135,25 @@ def _recoveries(drive: Drive) -> Iterator[Event]:
 def _log_messages(drive: Drive) -> Iterator[Event]:
     kinds: dict[tuple[str, str], list[LogMessage]] = {}
     for message in drive.log_messages:
-        if message.level >= Level.WARN:
+        if message.level >= Level.WARN and not kept_its_rate(message.text):
             kinds.setdefault((message.node, _NUMBER.sub("#", message.text)), []).append(message)
     ranked = sorted(kinds.values(), key=lambda alike: (-alike[0].level, alike[0].time_s))
     for alike in ranked[:_MESSAGES]:
         first = alike[0]
-        text = f"{level_word(first.level)} {first.node}: {_cut(first.text)}{_times(len(alike), alike[-1].time_s)}"
+        told, how_often = _worst(alike), _times(len(alike), alike[-1].time_s)
+        if told is not first:
+            how_often = f"{how_often.removesuffix(')')}, this the lowest)"
+        text = f"{level_word(first.level)} {first.node}: {_cut(told.text)}{how_often}"
         yield Event(first.time_s, "error" if first.level >= Level.ERROR else "message", text, "/rosout")
     if len(ranked) > _MESSAGES:
         left = ranked[_MESSAGES:]
         words = f"{len(left)} more kinds of message, {sum(map(len, left))} messages"
         yield Event(left[0][0].time_s, "message", words, "/rosout")
+
+
+def _worst(alike: list[LogMessage]) -> LogMessage:
+    """Of messages that differ in numbers alone the one of the slowest loop, or the first."""
+    return min(alike, key=lambda one: (loop_rate(one.text) or (0.0, 0.0))[0])
 
 
 def _diagnostics(drive: Drive) -> Iterator[Event]:

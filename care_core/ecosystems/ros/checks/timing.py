@@ -12,7 +12,7 @@ from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import GOALS, ROSOUT, STAMPED, reading
-from care_core.ecosystems.ros.node_messages import Level, LogMessage, control_rate, kept_its_rate
+from care_core.ecosystems.ros.node_messages import Level, LogMessage, control_rate, kept_its_rate, loop_rate
 from care_core.ecosystems.timeline import counted
 from care_core.numbers import median
 from care_core.text import log_time, shortened
@@ -63,7 +63,9 @@ def find(drive: Drive) -> Iterator[Finding]:
     yield from _slow_control(drive)
     for pattern, kind, title in _FAMILIES:
         complaints = [message for message in drive.log_messages if _counts(message, pattern)]
-        if not complaints or len(complaints) < max(FEWEST, SHARE * drive.duration_s):
+        # a loop that misses its rate for a moment, as a goal begins, says so at each of its steps
+        often = {int(one.time_s) for one in complaints} if pattern is _LOOPS else complaints
+        if not complaints or len(often) < max(FEWEST, SHARE * drive.duration_s):
             continue
         first = complaints[0]
         yield Finding(
@@ -72,11 +74,22 @@ def find(drive: Drive) -> Iterator[Finding]:
             onset_s=first.time_s,
             end_s=complaints[-1].time_s,
             severity="info" if kind == "control" else _at_most_warning(drive, first.time_s),
-            evidence=f'{len(complaints)} messages from {first.node}, first "{shortened(first.text, 90)}"',
+            evidence=_evidence(complaints),
             source="/rosout",
             suspect="parameter",
             probability=0.3,
         )
+
+
+def _evidence(complaints: list[LogMessage]) -> str:
+    """How many messages there are, and the lowest rate that they tell, or the first of them."""
+    first = complaints[0]
+    words = f"{len(complaints)} messages from {first.node}"
+    rates = [told for one in complaints if (told := loop_rate(one.text)) is not None]
+    if not rates:
+        return f'{words}, first "{shortened(first.text, 90)}"'
+    now, wanted = min(rates)
+    return f"{words} of less than its rate, the lowest {now:.2g} of {wanted:g} Hz"
 
 
 def _slow_control(drive: Drive) -> Iterator[Finding]:
