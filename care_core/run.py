@@ -16,6 +16,8 @@ class Unavailable(Record):
     hint: str = ""
     channel: str = ""
     """The channel that is not in the log, where that is why."""
+    never_varied: bool = False
+    """Whether it is that a sensor said the same throughout: one is broken, or nothing stirred."""
 
 
 Value = float | Unavailable

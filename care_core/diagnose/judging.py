@@ -283,7 +283,7 @@ def meaningful(
             continue
         if run.checks:
             found[name] = Unavailable("no mission was flown")
-        elif not is_known(found.get(name)):
+        elif not is_known(value := found.get(name)) and not (missed and _never_varied(value)):
             continue
         elif missed:
             found[name] = Unavailable(f"not judged: {missed}")
@@ -291,6 +291,11 @@ def meaningful(
             hint = f"give this mission's bound with --threshold {name}=VALUE"
             found[name] = Unavailable(mismatch, hint)
     return found
+
+
+def _never_varied(value: Value | None) -> bool:
+    """Whether a sensor only said the same: of a vehicle that never set out it does so rightly."""
+    return isinstance(value, Unavailable) and value.never_varied
 
 
 def _of_another_mission(objective: Variable, run: Run, schema: Schema) -> str:

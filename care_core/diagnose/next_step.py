@@ -3,7 +3,7 @@ before it was on the bench, in a simulator or in a hover; one that a simulator f
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from care_core.diagnose.hypotheses import first_named
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
@@ -178,7 +178,7 @@ def _leads(first: Hypothesis) -> bool:
 
 def _undone(diagnosis: Diagnosis) -> str:
     """What can be put right at once, empty where nothing is said to be that."""
-    findings = diagnosis.health.findings
+    run, findings = diagnosis.run, diagnosis.health.findings
     part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
     if part is not None:
         is_aside = part.severity != "critical" and first is not None and _leads(first) and first.name != part.title
@@ -194,10 +194,20 @@ def _undone(diagnosis: Diagnosis) -> str:
         return f"let {named.name} change as well: without it nothing is likely enough"
     said = None if named is None else next((one for one in findings if _says(one, named.name)), None)
     if named is not None and said is not None:
-        return f"put {listed(_put_back_with(named.name, said, findings))} back as the findings say"
+        return _put_right(_put_back_with(named.name, said, findings), findings, run)
     if named is not None and named.name not in diagnosis.run.config:
         return _looked_at(named.name, diagnosis)
     return ""
+
+
+def _put_right(names: Sequence[str], findings: Iterable[Finding], run: Run) -> str:
+    """What these parameters are set to, where findings say it of each."""
+    wanted = {name: value for one in findings for name, value in one.wanted}
+    if _is_robot(run) or not wanted.keys() >= set(names):
+        return f"put {listed(names)} back as the findings say"
+    values = [f"{name} to {shown(wanted[name])}" for name in names]
+    commands = ", ".join(f"'param set {name} {shown(wanted[name])}'" for name in names)
+    return f"set {listed(values)} ({commands})"
 
 
 def _is_kept(name: str, diagnosis: Diagnosis) -> bool:

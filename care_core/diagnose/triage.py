@@ -144,8 +144,9 @@ def diagnose(
     advised_odds = as_driven if abstained or fixes[0].odds is None else fixes[0].odds
     told_more: tuple[str, ...] = ()
     if unsure and not beyond:
+        is_named = is_part_first or (lead is not None and bool(abstained))
         everything = all_back(failed, promise, advised_odds)
-        told_more = to_record(faults, run) if is_part_first else _tell_more(failed, faults, health, everything)
+        told_more = to_record(faults, run) if is_named else _tell_more(failed, faults, health, everything)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,

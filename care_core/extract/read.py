@@ -231,7 +231,7 @@ class _Source(Record, eq=False):
         if not isinstance(value, Unavailable):
             return value if math.isfinite(value) else Unavailable("its value in the log is not a number", _LOOK)
         if value.channel in self.dead:
-            return Unavailable(self.dead[value.channel], "check the sensor and its driver")
+            return Unavailable(self.dead[value.channel], "check the sensor and its driver", never_varied=True)
         hint = format_named(self.log.format).missing_hint
         return replace(value, hint=hint) if hint and value.channel else value
 

@@ -30,7 +30,9 @@ _LEAST_W, _MOST_W = 1.0, 1e5
 """Mean power while armed: an autopilot and its receivers alone take more than a watt, air taxis up to 100 kW."""
 _AGREE, _ENOUGH_FOR_DOUBT = 2.0, 20
 """By what factor the monitor's counter and voltage times current may differ; thinned logs miss peaks, not half."""
-_NO_VOLTAGE = Unavailable("BAT says the same voltage throughout, or none", "is BATT_MONITOR one that measures voltage?")
+_NO_VOLTAGE = Unavailable(
+    "BAT says the same voltage throughout, or none", "is BATT_MONITOR one that measures voltage?", never_varied=True
+)
 
 
 def _throughout(bears: Bears) -> RestsOn:

@@ -54,7 +54,9 @@ def _measured(mission: Mission, *fields: str) -> Table | Unavailable:
         return missing(BATTERY)
     known = table.where(np.logical_and.reduce([np.isfinite(table[field]) for field in fields]))
     if len(known) < _MIN_ROWS or not is_alive(known["voltage_v"]) or float(known["voltage_v"].max()) < _LEAST_V:
-        return Unavailable("battery_status says the same voltage throughout, or none", "is the power module set up?")
+        return Unavailable(
+            "battery_status says the same voltage throughout, or none", "is the power module set up?", never_varied=True
+        )
     return known
 
 
