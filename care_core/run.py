@@ -62,6 +62,8 @@ class Damage(Record):
     time_s: float | None = None
     is_jump: bool = False
     """Whether the clock of the log jumps there: what lies between two records of it is unknown."""
+    is_whole: bool = False
+    """Whether no byte of the file is broken: only the times or the order of its messages are odd."""
 
 
 def place_of_damage(what: str, byte: int | None, time_s: float | None, told: Callable[[float], str] = log_time) -> str:

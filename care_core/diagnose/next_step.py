@@ -124,7 +124,7 @@ def _without_profile(diagnosis: Diagnosis) -> str:
         return "triage the .ulg that the vehicle itself wrote: profile px4 reads it, and telemetry holds little of it"
     if diagnosis.health.too_little == NOT_FLOWN:
         return "triage a log in which the vehicle was armed; 'care inspect LOG' shows what this one holds"
-    if diagnosis.health.too_little and any(not part.is_jump for part in run.log.damage):
+    if diagnosis.health.too_little and any(not (part.is_jump or part.is_whole) for part in run.log.damage):
         return "copy the log from the vehicle again: this file is damaged, and too little is left of it"
     if diagnosis.health.too_little:
         return "'care inspect LOG' shows what this log holds, 'care record PROFILE' what to record"

@@ -32,7 +32,7 @@ STATUS_WORDS: dict[RunStatus, str] = {
 }
 UNKNOWN_PARAMETER = "a parameter that the profile does not know"
 GUESS = "\u00a0probability\u00a0(a\u00a0guess)"
-NO_LIMIT = "no limit of this mission is known; what happened is told below"
+NO_LIMIT = "no limit of this mission is known"
 _CLAUSE = re.compile(r"\s*[,;(]")
 """What ends the first clause of a reason."""
 NO_LIMITS = "no limits for time and energy, no causes by parameters"

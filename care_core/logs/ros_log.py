@@ -421,7 +421,7 @@ class RosLog:
         if len(gaps) and gaps.max() > _DAY_NS:
             at = int(ordered[gaps.argmax()])
             text = f"the clock jumps: no message for {gaps.max() / _DAY_NS:.1f} days"
-            found.append(Damage(text, None, self._seconds(at)))
+            found.append(Damage(text, None, self._seconds(at), is_whole=True))
         found += self._steps_back()
         return tuple(found)
 
@@ -437,7 +437,7 @@ class RosLog:
                     at = int(kept[steps.argmin()])
         if topic:
             text = f"messages were sorted by time: up to {-worst_ns / 1e9:.1f} s out of order ({topic})"
-            yield Damage(text, None, self._seconds(at))
+            yield Damage(text, None, self._seconds(at), is_whole=True)
 
 
 class _Piece(Record, eq=False):

@@ -70,7 +70,8 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     elif diagnosis.profile.fit.verdict == "no":
         yield from wrapped("none fits", "Profile  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
-        yield from wrapped(damage.what + place_of_damage(damage.what, None, damage.time_s), "Damage   ")
+        label = "Note     " if damage.is_whole else "Damage   "
+        yield from wrapped(damage.what + place_of_damage(damage.what, None, damage.time_s), label)
     if len(run.log.damage) > DAMAGE_SHOWN:
         rest = len(run.log.damage) - DAMAGE_SHOWN
         yield f"Damage   and {rest} more {'places' if rest > 1 else 'place'}, 'care inspect' lists them"

@@ -61,6 +61,13 @@ def test_what_could_not_be_had_is_neither_zero_nor_ok() -> None:
     assert "does not say how" in time.reason
 
 
+@pytest.mark.parametrize(("success", "told"), [(0.0, "not judged: the mission was not completed"), (1.0, "BAT says")])
+def test_a_sensor_that_never_varied_is_none_to_doubt_of_what_never_set_out(success: float, told: str) -> None:
+    same = Unavailable("BAT says the same throughout", "check the sensor", never_varied=True)
+    run = replace(planted_run(), objectives={"success": success, "energy": same})
+    assert judge(run, SCHEMA, MODEL).results[2].reason.startswith(told)
+
+
 def test_without_a_threshold_the_value_is_shown_but_not_judged() -> None:
     bare = with_variable(SCHEMA, replace(TIME, threshold=None))
     time = judge(planted_run(), bare, MODEL).results[1]

@@ -140,6 +140,8 @@ def test_a_damaged_log_of_which_too_little_is_left_is_copied_again() -> None:
     cut = replace(made.run, log=replace(made.run.log, damage=(Damage("cut in a record", 4),)))
     short = replace(made, profile=unfit, run=cut, health=replace(made.health, too_little=TOO_SHORT))
     assert next_step(short, has_failed=False).startswith("copy the log from the vehicle again")
+    sorted_by_time = replace(cut, log=replace(cut.log, damage=(Damage("messages were sorted", is_whole=True),)))
+    assert "'care inspect LOG' shows what" in next_step(replace(short, run=sorted_by_time), has_failed=False)
 
 
 def test_a_profile_that_was_named_and_does_not_fit_gives_way_to_the_one_that_does() -> None:
@@ -223,6 +225,16 @@ def test_what_can_be_put_right_at_once_comes_first() -> None:
     assert said == "put SERVO2_FUNCTION back as the findings say, then try it in the simulator or a low hover"
 
 
+def test_the_value_that_a_finding_wants_is_told_with_its_command() -> None:
+    name = "TKOFF_RPM_MIN"
+    kept = Finding(
+        "takeoff", "the motors were kept from spooling up", 30.5, 35.0, "critical", "", "", "parameter", 0.9,
+        parameters=(name,), wanted=((name, 0.0),),
+    )  # fmt: skip
+    told = replace(failed(kept), hypotheses=(Hypothesis("parameter", name, 0.96),))
+    assert next_step(told, has_failed=True).startswith(f"set {name} to 0 ('param set {name} 0'), then try it")
+
+
 def test_of_two_motors_that_were_switched_off_both_are_switched_on() -> None:
     off = [
         Finding(
@@ -247,7 +259,7 @@ def test_a_parameter_that_is_to_stay_is_not_put_back() -> None:
     kept = replace(failed(slow), hypotheses=(named,), abstained="nothing is likely enough, with A, B kept as it is")
     assert next_step(kept, has_failed=True) == "let A change as well: without it nothing is likely enough"
     free = replace(kept, abstained="nothing is likely enough")
-    assert next_step(free, has_failed=True) == "put A back as the findings say"
+    assert next_step(free, has_failed=True) == "set A to 40 ('param set A 40')"
 
 
 def test_a_change_says_how_likely_it_is_the_cause() -> None:

@@ -79,7 +79,7 @@ def test_what_another_robot_set_is_none_of_this_ones_parameters(two: Case) -> No
 def test_a_robot_that_failed_is_told_its_own_cause_beside_a_good_one(tmp_path: Path) -> None:
     case = care_core.triage(mix(tmp_path / "a.mcap", (FAILED, lambda topic, _: topic), (GOOD, in_namespace("/robot2"))))
     assert "Change xy_goal_tolerance 0.04 -> 0.25" in said(case)
-    assert "robot /robot2 is in this recording, too: findings are of the robot without a name space" in said(case)
+    assert "robot /robot2 is in this recording, too: this answer is of the robot without a name space" in said(case)
 
 
 def test_two_robots_in_name_spaces_are_both_told_without_a_profile(tmp_path: Path) -> None:

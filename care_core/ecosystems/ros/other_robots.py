@@ -31,7 +31,7 @@ def other_robots(drive: Drive, found: Iterable[tuple[Drive, Sequence[Finding]]])
             reached = sum(goal.outcome == "reached" for goal in other.goals)
             yield Finding(
                 kind="log",
-                title=f"{_called(name)} is in this recording, too: findings are of {_called(drive.robots[0])}",
+                title=f"{_called(name)} is in this recording, too: this answer is of {_called(drive.robots[0])}",
                 onset_s=0.0,
                 end_s=drive.duration_s,
                 severity="info",
