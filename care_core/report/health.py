@@ -17,6 +17,8 @@ EVENTS_SHOWN = 24
 LED_TO_SHOWN = 4
 REASONS_SHOWN = 4
 
+_CITED = re.compile(r"\b(?:at|from) (\d+\.\d s(?: \(\d+:\d\d\))?)")
+"""A time as evidence tells it."""
 _QUOTED = re.compile(r'[A-Z]+ "(?P<text>.+)"')
 
 E = TypeVar("E", bound="Event | EventEntry")
@@ -30,29 +32,41 @@ def finding_sentence(finding: FindingEntry) -> str:
     return f"{finding.title}, at {log_time(finding.onset_s)}{late}.{f' {shown_by}.' if shown_by else ''}{led}"
 
 
-def account_lines(account: Sequence[Event | EventEntry], robot: str = "", most: int = EVENTS_SHOWN) -> Iterator[str]:
-    """The account as text; of a long one the lines that say most about a failure."""
+def account_lines(
+    account: Sequence[Event | EventEntry],
+    findings: Sequence[Finding | FindingEntry] = (),
+    robot: str = "",
+    most: int = EVENTS_SHOWN,
+) -> Iterator[str]:
+    """The account as text; of a long one the lines that say most about a failure, and those that findings cite."""
     if not account:
         return
     is_named = not robot or account[0].kind == "vehicle"
     yield from wrapped("What happened" if is_named else f"What happened ({robot})")
-    told = telling(account, most)
+    told = telling(account, most, findings)
     for time, moment in zip(log_times([one.time_s for one in told]), told, strict=True):
         yield from wrapped(moment.text, f"  {time:>9}  ")
     if len(told) < len(account):
         yield f"  and {len(account) - len(told)} more: 'care inspect' tells all"
 
 
-_TELLING = ("crash", "failsafe", "error", "arming", "goal", "damage", "mode", "recovery", "message")
+_TELLING = ("vehicle", "crash", "failsafe", "error", "flight", "arming", "goal", "damage", "mode", "recovery",
+            "battery", "gps", "message")  # fmt: skip
 
 
-def telling(account: Sequence[E], most: int) -> list[E]:
-    """At most so many moments, in order of time: those of the kinds that say most about a failure stay."""
+def telling(account: Sequence[E], most: int, findings: Sequence[Finding | FindingEntry] = ()) -> list[E]:
+    """At most so many moments, in order of time: those that the evidence of a finding tells the time of, then those of
+    the kinds that say most about a failure."""
     if len(account) <= most:
         return list(account)
     order = {kind: place for place, kind in enumerate(_TELLING)}
-    ranked = sorted(range(len(account)), key=lambda i: (order.get(account[i].kind, len(order)), i))
-    return [account[i] for i in sorted(ranked[:most])]
+    cited = {time for finding in findings for time in _CITED.findall(finding.evidence)}
+
+    def weight(at: int) -> tuple[bool, int, int]:
+        event = account[at]
+        return log_time(event.time_s) not in cited, order.get(event.kind, len(order)), at
+
+    return [account[at] for at in sorted(sorted(range(len(account)), key=weight)[:most])]
 
 
 def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:

@@ -35,7 +35,7 @@ def to_text(diagnosis: Diagnosis) -> str:
         _verdict(verdict),
         reason_lines(verdict.reasons),
         finding_lines(health.findings) if health.timeline or health.findings else (),
-        account_lines(health.timeline, health.robot),
+        account_lines(health.timeline, health.findings, health.robot),
         _origin(diagnosis),
         _missions(diagnosis),
         _objectives(diagnosis),
@@ -226,7 +226,8 @@ def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _untold(diagnosis: Diagnosis) -> list[Evidence]:
     """The robot's own messages that stand nowhere above: not in what happened, and not beside a cause."""
-    happened = [but_for_numbers(one.text) for one in telling(diagnosis.health.timeline, EVENTS_SHOWN)]
+    health = diagnosis.health
+    happened = [but_for_numbers(one.text) for one in telling(health.timeline, EVENTS_SHOWN, health.findings)]
     shown = (c for fault in diagnosis.faults for c in fault.causes if not c.is_lead and not _is_unlikely(c, diagnosis))
     named = {cause.option.name for cause in shown}
     own = (one for one in diagnosis.run.evidence if not one.is_concluded and named.isdisjoint(one.options))

@@ -27,7 +27,8 @@ from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding
 from care_core.errors import UsageError
 from care_core.files import write_atomically
 from care_core.records import replace
-from care_core.report.document import TriageDocument, build_document
+from care_core.report.document import build_document, json_schema
+from care_core.report.health import telling
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
@@ -167,6 +168,19 @@ def test_a_cause_that_hardly_acted_is_named_and_no_more() -> None:
     likely = replace(told, hypotheses=(Hypothesis("parameter", "land_speed", 0.03, 0.2),))
     assert "land_speed -> land_time" in to_text(likely)
     assert build_document(told).faults == build_document(likely).faults
+
+
+def test_what_a_finding_cites_and_each_landing_stand_in_what_happened() -> None:
+    early = [Event(float(n), "message", f"chatter {n}", "MSG") for n in range(40)]
+    cited = Event(67.2, "topic", "the vertical speed is reset", "estimator_status")
+    landed = Event(67.4, "flight", "landed", "vehicle_land_detected")
+    late = [Event(70.0 + n, "message", f"noise {n}", "MSG") for n in range(10)]
+    idle = Finding("motor", "the motors stopped", 67.3, 68.0, "critical", "idle; a reset at 67.2 s", "outputs")
+    shown = telling([*early, cited, landed, *late], 10, [idle])
+    assert cited in shown
+    assert landed in shown
+    assert shown == sorted(shown, key=lambda one: one.time_s)
+    assert cited not in telling([*early, cited, landed, *late], 10)
 
 
 def test_a_message_that_stands_elsewhere_is_not_repeated() -> None:
