@@ -129,11 +129,6 @@ def hypotheses_of(failure: NoisyOr) -> tuple[Hypothesis, ...]:
     )
 
 
-def first_named(hypotheses: Iterable[Hypothesis]) -> Hypothesis | None:
-    """The likeliest explanation that has a name: a parameter that nothing knows can be looked for nowhere."""
-    return next((one for one in hypotheses if (one.what, one.name) != UNKNOWN), None)
-
-
 def of_battery(missed: Sequence[ObjectiveResult], findings: Iterable[Finding]) -> bool:
     """Whether all that went wrong is a failsafe of the battery, whatever else was noticed on the way."""
     others = any(one.severity == "critical" and (one.kind != "battery" or one.parameters) for one in findings)

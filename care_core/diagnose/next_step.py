@@ -5,11 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from care_core.diagnose.hypotheses import first_named
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
-from care_core.diagnose.records import Diagnosis, Fix, Hypothesis, helps
+from care_core.diagnose.records import Diagnosis, Fix, Hypothesis, first_named, helps
 from care_core.diagnose.remedies import remedy
-from care_core.diagnose.tell_more import AGAIN
 from care_core.ecosystems.findings import (
     IDLED,
     KILLED,
@@ -28,6 +26,7 @@ from care_core.text import listed
 
 UPSETS: frozenset[FindingKind] = frozenset(("attitude", "crash", "motor", "takeoff", "thrust"))
 """Kinds of findings after which a vehicle may be damaged, or does not do what it is told."""
+AGAIN = "run again"
 REFUSED = "arming was refused: "
 KEPT = " kept as it is"
 _UPSET_MESSAGES = frozenset(("crash", "thrust"))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
-from care_core.diagnose.noisy_or import NoisyOr, What
+from care_core.diagnose.noisy_or import UNKNOWN, NoisyOr, What
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.ecosystems.ranking import lost_by
 from care_core.metadata.causal_map import Role as ParameterRole
@@ -266,6 +266,11 @@ class Hypothesis(Record):
     probability: float
     acts: float = 0.0
     """Probability that it acted, whatever else did: causes are not exclusive."""
+
+
+def first_named(hypotheses: Iterable[Hypothesis]) -> Hypothesis | None:
+    """The likeliest explanation that has a name: a parameter that nothing knows can be looked for nowhere."""
+    return next((one for one in hypotheses if (one.what, one.name) != UNKNOWN), None)
 
 
 class OutsideSuspect(Record):

@@ -9,6 +9,7 @@ import numpy as np
 
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.fixes import candidate_values
+from care_core.diagnose.next_step import AGAIN
 from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Experiment, Fault
 from care_core.numbers import Floats
@@ -21,7 +22,6 @@ TELLING = 0.15
 HYPOTHESES = 3
 """Leading causes that are compared in pairs."""
 MOST_METRICS = 3
-AGAIN = "run again"
 SAME_AGAIN = (
     "run the same configuration again: if it fails again, the cause persists (a parameter outside the profile, or the "
     "vehicle); if not, it is something in the environment (wind, obstacle, load)"

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 import care_core
 from care_core.application.case import Case, predict
-from care_core.diagnose.hypotheses import first_named
 from care_core.diagnose.outside.change import (
     Advisable,
     check_first,
@@ -23,7 +22,7 @@ from care_core.diagnose.outside.change import (
 from care_core.diagnose.outside.off import off_parameters
 from care_core.diagnose.outside.signs import Signs, signs_of
 from care_core.diagnose.outside.suspects import outside_suspects, phases_of
-from care_core.diagnose.records import Hypothesis, ObjectiveResult, OutsideSuspect
+from care_core.diagnose.records import Hypothesis, ObjectiveResult, OutsideSuspect, first_named
 from care_core.diagnose.verdict import verdict_of
 from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding, Health
 from care_core.ecosystems.vehicles.vehicle import Vehicle

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import cast, get_args
 
-from care_core.diagnose.hypotheses import first_named
-from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect
+from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect, first_named
 from care_core.ecosystems.findings import Finding, every_finding
 from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.ecosystems.vehicles.vehicle import Kind, Vehicle
