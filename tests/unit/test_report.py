@@ -27,7 +27,7 @@ from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding
 from care_core.errors import UsageError
 from care_core.files import write_atomically
 from care_core.records import replace
-from care_core.report.document import build_document, json_schema
+from care_core.report.document import TriageDocument, build_document
 from care_core.report.health import telling
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown
