@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Literal, TypeGuard
 
@@ -33,6 +34,11 @@ def shown(value: float | str | None) -> str:
     if value is None:
         return "not there"
     return value if isinstance(value, str) else f"{value:.7g}"
+
+
+def is_said_again(before: float | str, value: float) -> bool:
+    """Whether a record of a parameter says what the one before it said; what is not a number equals nothing."""
+    return before == value or (before != before and value != value)
 
 
 class Setting(Record):
@@ -130,6 +136,11 @@ class Robot(Record):
     """Whether it tells this robot from others of its kind: a system id as delivered, or a model's name, does not."""
     is_simulated: bool = False
     """Whether it is a simulator's: every vehicle that this machine simulates has this id."""
+
+    @property
+    def digest(self) -> str:
+        """What tells it from others without naming it; empty where its id does not, as a simulator's."""
+        return hashlib.sha256(self.id.encode()).hexdigest()[:16] if self.is_sure and not self.is_simulated else ""
 
 
 class LogInfo(Record):

@@ -17,9 +17,9 @@ from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
 from care_core.diagnose.verdict import status_of, verdict_of
 from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.profile.schema import Schema
-from care_core.records import Record, replace
-from care_core.run import Run
-from care_core.variables import Threshold, Variable
+from care_core.records import Record, field, replace
+from care_core.run import LogInfo, Run
+from care_core.variables import Threshold, Variable, asks_alike
 
 Made = Literal["made", "not_made", "other_value", "unknown"]
 Outcome = Literal["recovered", "kept", "unchanged", "better", "worse", "broken", "unknown"]
@@ -41,6 +41,11 @@ SAME_LOG = "this is the log that the report is about, not one of a later run"
 NEITHER = "neither the change nor the mission is that of the report"
 OTHER_NEED = 0.1
 """Share by which what two missions need differs where they are not the same one."""
+HOME_M = 10.0
+"""A way that begins or ends at home is as much longer or shorter where a vehicle is put down elsewhere on its field."""
+_FROM_HOME = ("path_length", "return_distance")
+_ONE_BY_ONE = "goals_asked"
+"""Extractor of what is sent goal by goal: a mission that is given up asks for less than all of it."""
 
 NOT_HELD = Before(None, "not_evaluated", None)
 """An objective of which the report says nothing."""
@@ -68,6 +73,13 @@ class Promise(Record):
     config: Mapping[str, float]
     objectives: Mapping[str, Before]
     sets: tuple[PromisedSet, ...]
+    format: str = ""
+    frame: str = ""
+    """As the log said it; empty where it, or the report, does not."""
+    robot: str = ""
+    """`Robot.digest` of whose log it was; empty where nothing told for sure."""
+    context: Mapping[str, float] = field(default_factory=dict)
+    """What the run met, and what its mission asked for."""
 
 
 class MadeChange(Record):
@@ -147,9 +159,11 @@ def verify(promise: Promise, diagnosis: Diagnosis, schema: Schema, thresholds: C
     )
     another = tuple(islice(_another_mission(checks), 1))
     nothing_alike = another and not any(change.made == "made" for change in changes)
-    doubt = _doubt(promise, run, schema) or (NEITHER if nothing_alike else "")
+    doubt = _doubt(promise, run, schema, changes) or (NEITHER if nothing_alike else "")
     verdict, sentence = _verdict(changes, others, checks, diagnosis, doubt)
     notes = (*_notes(promise, run, schema, diagnosis.objectives, own), *another)
+    if doubt not in ("", NEITHER) and verdict != "cannot_tell":
+        notes = (*notes, doubt)
     headline = verdict_of(diagnosis).headline
     return Verification(verdict, sentence, chosen, kept.p_fixed, changes, others, checks, headline, notes)
 
@@ -173,11 +187,38 @@ def _held_to(result: ObjectiveResult, own: Threshold | None) -> ObjectiveResult:
     return replace(result, threshold=own, need=None, status="fault", reason="by the report's own limit")
 
 
-def _doubt(promise: Promise, run: Run, schema: Schema) -> str:
+def _doubt(promise: Promise, run: Run, schema: Schema, changes: Iterable[MadeChange]) -> str:
     """Why the run may not be of the same robot or mission, one clause; empty where it is."""
     if run.log.sha256 == promise.sha256:
         return SAME_LOG
-    return "" if schema.travels else run.mission.mismatch
+    mismatch = "" if schema.travels else run.mission.mismatch
+    return mismatch or _another_vehicle(promise, run.log, changes) or next(_asked_otherwise(promise, run, schema), "")
+
+
+def _another_vehicle(promise: Promise, log: LogInfo, changes: Iterable[MadeChange]) -> str:
+    """What tells that the log is of another vehicle, one clause; a frame that the report changes is the same one's."""
+    reframed = any("FRAME" in name for change in changes for name in change.option.parameters)
+    frame = log.facts.get("frame", "")
+    if promise.format == log.format and promise.frame and frame and promise.frame != frame and not reframed:
+        return f"this is another vehicle: its frame is {frame}, that of the report {promise.frame}"
+    is_other = log.robot is not None and promise.robot and log.robot.digest and log.robot.digest != promise.robot
+    return "this is another vehicle: it has another id than that of the report" if is_other else ""
+
+
+def _asked_otherwise(promise: Promise, run: Run, schema: Schema) -> Iterator[str]:
+    """What the run's mission asks for and that of the report does not, in clauses. How a planner writes an item, what
+    is no waypoint, and where home is within a field make no other mission."""
+    functional = {one.name for one in schema.objectives if one.kind == "functional"}
+    given_up = any(promise.objectives.get(name, NOT_HELD).status == "fault" for name in functional)
+    for name, now in run.mission.asked:
+        extract, unit = schema.variables[name].extract, schema.variables[name].unit
+        if extract is None or name not in promise.context or (given_up and extract.kind == _ONE_BY_ONE):
+            continue
+        before = promise.context[name]
+        moves_with_home = extract.args.get("what") in _FROM_HOME and abs(now - before) <= HOME_M
+        if not asks_alike(before, now) and not moves_with_home:
+            shown = f"{now:.4g} {unit}".rstrip()
+            yield f"this is another mission than that of the report: {name} is {shown}, it was {before:.4g} there"
 
 
 def _another_mission(checks: Iterable[ObjectiveCheck]) -> Iterator[str]:

@@ -74,13 +74,17 @@ class ProfileEntry(Document, kw_only=True, omit_defaults=True):
         return profile_title(self.name, self.origin)
 
 
-class LogEntry(Document, kw_only=True):
+class LogEntry(Document, kw_only=True, omit_defaults=True):
     path: str
     format: str
     start: str | None
     duration_s: float
     damage: list[DamageEntry]
     sha256: str
+    frame: str = ""
+    """As the log says it; empty where it does not."""
+    robot: str = ""
+    """What tells whether a later log is of the same robot, without naming it; empty where nothing tells for sure."""
 
 
 class ThresholdEntry(Document, kw_only=True):
@@ -349,7 +353,13 @@ def build_document(diagnosis: Diagnosis) -> Report:
     return Report(
         profile=publish(ProfileEntry, diagnosis.profile) if diagnosis.profile.name else None,
         fit=publish(Fit, diagnosis.profile.fit),
-        log=publish(LogEntry, log, damage=damage_entries(log.damage)),
+        log=publish(
+            LogEntry,
+            log,
+            damage=damage_entries(log.damage),
+            frame=clean(log.facts.get("frame", "")),
+            robot=log.robot.digest if log.robot else "",
+        ),
         config={name: plain_number(value) for name, value in run.config.items() if math.isfinite(value)},
         context=_values(run.context),
         metrics=_values(run.metrics),

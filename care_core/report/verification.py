@@ -153,6 +153,10 @@ def promise_of(report: TriageDocument, schema: Schema, path: Path) -> Promise:
             )
             for key, fix in fix_sets(report.fix)
         ),
+        format=report.log.format,
+        frame=report.log.frame,
+        robot=report.log.robot,
+        context={name: value for name, value in report.context.items() if value is not None},
     )
 
 

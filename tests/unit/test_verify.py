@@ -23,8 +23,8 @@ from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.reading import read_report
 from care_core.report.writers import to_json, to_yaml
-from care_core.run import FITS, Fit, ProfileChoice, Run, Setting, Unavailable
-from care_core.variables import Threshold
+from care_core.run import FITS, Fit, ProfileChoice, Robot, Run, Setting, Unavailable
+from care_core.variables import Extract, Role, Threshold, Variable
 from tests.conftest import Care
 from tests.made import made_diagnosis
 from tests.planted import DEFAULTS, ENERGY, SCHEMA, SUCCESS, TIME, planted_run
@@ -162,6 +162,47 @@ def test_what_was_not_evaluated_or_is_another_mission_cannot_be_told() -> None:
     found = verify(promise(), triaged(elsewhere), SCHEMA)
     assert found.verdict == "cannot_tell"
     assert "3 waypoints" in found.sentence
+
+
+def asking(asked: float, before: float, what: str = "legs") -> Verification:
+    """A run that recovered, of a mission whose legs, or way, were so many when the report was written."""
+    way = Variable(name=what, role=Role.CONTEXT, extract=Extract("mission_asked", {"what": what}))
+    schema = replace(SCHEMA, variables={**SCHEMA.variables, what: way})
+    run = planted_run(speed=5.0)
+    run = replace(run, mission=replace(run.mission, asked=((what, asked),)))
+    return verify(replace(promise(), context={what: before}), triaged(run), schema)
+
+
+def test_another_mission_than_the_reports_proves_nothing() -> None:
+    found = asking(7.0, before=5.0)
+    assert found.verdict == "cannot_tell"
+    assert found.sentence == (
+        "Cannot tell: this is another mission than that of the report: legs is 7, it was 5 there."
+    )
+    assert asking(5.0, before=5.0).verdict == "fixed_as_promised"
+
+
+def test_a_vehicle_that_is_put_down_elsewhere_on_its_field_flies_the_same_mission() -> None:
+    assert asking(38.0, before=30.0, what="path_length").verdict == "fixed_as_promised"
+    assert asking(60.0, before=30.0, what="path_length").verdict == "cannot_tell"
+
+
+def test_another_vehicle_than_the_reports_proves_nothing() -> None:
+    run = planted_run(speed=5.0)
+
+    def verified(frame: str, robot: str, changed: str = "speed") -> Verification:
+        log = replace(run.log, facts={"frame": frame}, robot=Robot(robot, robot, "the board", is_sure=True))
+        known = Robot("a", "a", "the board", is_sure=True).digest
+        said = replace(promise(), format=run.log.format, frame="QUAD/X", robot=known)
+        made = {"FRAME_TYPE": (0.0, 1.0)} if changed == "FRAME_TYPE" else {"speed": (2.0, 5.0)}
+        said = replace(said, sets=(replace(PROMISED, changes=made),))
+        return verify(said, triaged(replace(run, log=log)), SCHEMA)
+
+    assert verified("QUAD/X", "a").verdict == "fixed_as_promised"
+    assert "its frame is HEXA/X, that of the report QUAD/X" in verified("HEXA/X", "a").sentence
+    assert verified("HEXA/X", "a").verdict == "cannot_tell"
+    assert verified("QUAD/X", "b").verdict == "cannot_tell"
+    assert verified("QUAD/PLUS", "a", changed="FRAME_TYPE").verdict != "cannot_tell", "that is what was to be changed"
 
 
 def test_an_alternative_that_was_made_instead_is_what_is_judged() -> None:
