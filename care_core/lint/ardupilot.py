@@ -148,7 +148,7 @@ def _told(releases: Sequence[Release]) -> str:
 def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
     """A value that no release that the file may be for allows."""
     value = entry.number
-    if value is None or not facts:
+    if value is None or math.isnan(value) or not facts:
         return
     fact = facts[-1]
     bounded = [one for one in facts if one.low is not None and one.high is not None]

@@ -7,12 +7,15 @@ from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 
 from care_core.configs.driven import same_value
+from care_core.ecosystems.not_numbers import instead
 from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.metadata import ardupilot, px4
 from care_core.run import shown
 
 _ALIKE = 0.8
 """Least likeness of a name to the one that is meant, of difflib."""
+_COMPUTED = "whatever is computed with it is no number either"
 
 
 def near(name: str, known: Iterable[str]) -> str:
@@ -38,8 +41,18 @@ def check(file: ConfigFile) -> Iterator[Problem]:
         number = entry.number
         is_yaml = file.format.is_yaml
         if number is not None and math.isnan(number) and not is_yaml:
-            text = f"{entry.name} is not a number."
-            yield file.error("wrong-type", entry, text, "Give it one.")
+            text, value = f"{entry.name} is not a number.", instead(entry.name, _default)
+            hint = "Put its default back." if value is None else f"Set it to {shown(value)}."
+            yield file.error("wrong-type", entry, text, hint, _COMPUTED)
+
+
+def _default(name: str) -> float | None:
+    """The default that every firmware which knows a vehicle's parameter gives it."""
+    fact = px4.fact_of(name)
+    known = {ardupilot.firmware_default(name, kind) for kind in ardupilot.VEHICLES}
+    known |= {fact.default_number} if fact is not None else set()
+    told = known - {None}
+    return told.pop() if len(told) == 1 else None
 
 
 def _twice(file: ConfigFile, earlier: Entry, entry: Entry) -> Problem:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.logs.base import Table, Wanted
-from care_core.run import Setting
+from care_core.run import Setting, is_said_again
 
 # GPS time runs ahead of UTC by the leap seconds since 1980: 18 since 2017, and none is announced.
 _GPS_EPOCH = datetime(1980, 1, 6, tzinfo=timezone.utc) - timedelta(seconds=18)
@@ -47,7 +47,7 @@ def history(rows: Iterable[tuple[float, str, float, float | None]], source: str)
     known: dict[str, list[Setting]] = {}
     for t, name, value, default in rows:
         values = known.setdefault(name, [])
-        if not values or values[-1].value != value:
+        if not values or not is_said_again(values[-1].value, value):
             values.append(Setting(name, value, source, default=default, changed_at_s=t if values else None))
     return {name: tuple(values) for name, values in known.items()}
 
@@ -62,7 +62,7 @@ def parameters_of(table: Table | None, number: Callable[[float], float]) -> dict
     defaults = table["Default"].tolist() if has_default else [np.nan] * len(table)
     references = [number(default) if np.isfinite(default) else None for default in defaults]
     rows = zip(table.t.tolist(), table["Name"].tolist(), map(number, table["Value"].tolist()), references, strict=True)
-    return history((row for row in rows if np.isfinite(row[2])), "PARM")
+    return history(rows, "PARM")
 
 
 def shortest(value: float) -> float:

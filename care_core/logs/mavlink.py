@@ -309,7 +309,7 @@ def _parameters(table: Table, *, as_bytes: bool) -> Iterable[tuple[float, str, f
         if code is not None:
             raw = np.array([value], dtype="<f4").view(np.uint8)
             yield float(t), name, float(raw[: np.dtype(code).itemsize].view(code)[0])
-        elif np.isfinite(value):
+        elif np.isfinite(value) or int(kind) not in _PARAM_INTEGERS:
             yield float(t), name, shortest(value)
 
 

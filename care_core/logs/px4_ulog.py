@@ -42,7 +42,7 @@ from care_core.logs.ulog_records import (
     read_contents,
 )
 from care_core.numbers import Bools, Floats, median
-from care_core.run import Damage, Setting
+from care_core.run import Damage, Setting, is_said_again
 
 MESSAGES = "logged_messages"
 SOURCE = "PX4 parameters"
@@ -218,13 +218,13 @@ class Px4Log:
         defaults = _defaults(contents.others, unread)
         known: dict[str, list[Setting]] = {}
         for name, value in _keyed(initial, PARAMETER, unread).items():
-            if _is_number(value):
+            if isinstance(value, (int, float)):
                 default = defaults.get(name, value) if contents.has_defaults else None
                 known[name] = [Setting(name, _number(value), SOURCE, _number(default) if _is_number(default) else None)]
         for one in later:
             for name, value in _keyed([one], PARAMETER, unread).items():
                 values = known.setdefault(name, [])
-                if _is_number(value) and (not values or values[-1].value != _number(value)):
+                if isinstance(value, (int, float)) and not (values and is_said_again(values[-1].value, _number(value))):
                     values.append(Setting(name, _number(value), SOURCE,
                                           changed_at_s=times.at(one.byte) if values else None))  # fmt: skip
         return {name: tuple(values) for name, values in known.items() if values}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.diagnose.parts import is_pack
+from care_core.ecosystems import not_numbers
 from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
@@ -387,11 +389,30 @@ def test_a_calibration_that_is_no_number_is_the_dead_compass() -> None:
     for number in ("", "#2"):
         for axis in "XYZ":
             made.table[f"MAG{number}"][f"Mag{axis}"][made.after(FAILS_S)] = 0.0
-    made.rows["PARM"] = [(0.0, {"Name": "COMPASS_MOT_X", "Value": float("nan")})]
+    made.settings["COMPASS_MOT_X"] = math.nan
     finding = first(made)
     assert (finding.severity, finding.suspect) == ("critical", "parameter")
     assert "COMPASS_MOT_X" in finding.evidence
     assert (first(made).parameters, first(made).wanted) == (("COMPASS_MOT_X",), (("COMPASS_MOT_X", 0.0),))
+    assert not [one for one in made.find() if one.title == "the compass reads nothing"]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_not_a_number_is_named_with_the_value_to_put(value: float) -> None:
+    made = Made()
+    made.settings["ATC_RAT_RLL_P"] = value
+    (finding,) = made.find()
+    assert finding.title == "ATC_RAT_RLL_P is not a number"
+    assert finding.wanted == (("ATC_RAT_RLL_P", 0.135),)
+    assert finding.severity == "warning", "it flew well"
+
+
+def test_what_is_not_a_number_is_critical_where_control_was_lost() -> None:
+    known = {name: (Setting(name, math.nan, "PARM"),) for name in ("ATC_RAT_RLL_P", "ATC_RAT_PIT_P", "BATT_CAPACITY")}
+    gains, battery = not_numbers.find(known, lambda _: None, END_S, failed=not_numbers.FLY, source="PARM")
+    assert (gains.severity, battery.severity) == ("critical", "warning")
+    assert gains.title == "ATC_RAT_RLL_P and ATC_RAT_PIT_P are not numbers"
+    assert gains.wanted == ()
 
 
 def test_a_refusal_that_names_the_compass_is_the_compass() -> None:

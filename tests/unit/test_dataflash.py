@@ -14,6 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.errors import LogError
+from care_core.logs.ardupilot import parameters_of, shortest
+from care_core.logs.base import Table
 from care_core.logs.dataflash import DataFlashLog
 from tests.whole import examples
 
@@ -226,3 +228,11 @@ def test_reads_a_wild_log_with_a_broken_tail() -> None:
     assert log.start == "2020-03-03T11:49:20+00:00"
     assert len(log.settings()) == 1027
     assert [one.what for one in log.damage] == ["the log breaks off inside a record, its last 38 bytes"]
+
+
+def test_a_parameter_that_is_not_a_number_is_one_as_driven() -> None:
+    names = np.array(["A", "B", "A"], dtype=object)
+    table = Table(np.arange(3.0), {"Name": names, "Value": np.array([np.nan, np.inf, np.nan])})
+    found = parameters_of(table, shortest)
+    assert [(name, len(history)) for name, history in found.items()] == [("A", 1), ("B", 1)], "said again, no change"
+    assert math.isnan(float(found["A"][0].value))

@@ -180,3 +180,13 @@ def test_a_rover_that_its_wheels_steer_is_told_to_leave_the_steering_out(tmp_pat
 def test_an_extract_and_a_submarine_may_leave_out_outputs_and_gains(tmp_path: Path) -> None:
     assert found(tmp_path, COPTER | {"SERVO4_FUNCTION": 0}) == []
     assert found(tmp_path, {"FRAME_CONFIG": 1, "ATC_ANG_RLL_P": 0, "JS_GAIN_DEFAULT": 0.5, "FS_LEAK_ENABLE": 1}) == []
+
+
+def test_what_is_not_a_number_is_told_with_the_value_to_put(tmp_path: Path) -> None:
+    path = tmp_path / "a.param"
+    path.write_text("COMPASS_MOT_X,nan\nATC_RAT_RLL_P,nan\n", encoding="utf-8")
+    (linted,) = lint([str(path)])
+    told = [one for one in linted.problems if one.rule in ("wrong-type", "out-of-range")]
+    assert [(one.parameter, one.hint) for one in told] == [
+        ("COMPASS_MOT_X", "Set it to 0."), ("ATC_RAT_RLL_P", "Set it to 0.135."),
+    ]  # fmt: skip

@@ -40,6 +40,7 @@ from care_core.ecosystems.ardupilot.checks.settings import (
     heading,
     hover,
     level,
+    not_numbers,
     outputs,
     standing,
     supply,
@@ -58,6 +59,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
 CHECKS: tuple[Check[Flight], ...] = (
+    not_numbers.CHECK,
     heading.CHECK,
     hover.CHECK,
     thrust_curve.CHECK,

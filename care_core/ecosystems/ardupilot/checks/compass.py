@@ -27,12 +27,13 @@ from care_core.ecosystems.ardupilot.statistics import (
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.liveness import says_nothing
+from care_core.ecosystems.not_numbers import broken
 from care_core.ecosystems.spans import during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, known_median, median, quantile
 
 AXES = ("MagX", "MagY", "MagZ")
-READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "PARM": ("Name", "Value")}
+READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",)}
 
 LIMITS = Limits()
 APART = LIMITS.add("two compasses apart in the level plane", 200.0, "mGauss", "AP_COMPASS_MAX_XY_LENGTH_DIFF")
@@ -78,15 +79,11 @@ _FIELD_WORDS = re.compile("mag field|compass|mag anomaly", re.IGNORECASE)
 
 def find(flight: Flight) -> Iterator[Finding]:
     """What is wrong with the compasses while they matter: the first of these that shows, but no parameter."""
-    compasses = [
-        watched
-        for n, table in enumerate(flight.all("MAG", *AXES), start=1)
-        if len(watched := table.where(flight.watch(table.t))) >= 3
-        and flight.setting("COMPASS_USE" if n == 1 else f"COMPASS_USE{n}") != 0
-        and not all(says_nothing(table[axis]) for axis in AXES)
-    ]
+    compasses = _in_use(flight)
     if flight.setting("COMPASS_ENABLE", "MAG_ENABLE") == 0 or heading.wrong_setting(flight) is not None:
         return
+    if any(name.startswith("COMPASS_") for name in broken(flight.settings)):
+        return  # it makes every field none
     if not compasses:
         yield from _refused(flight, compasses)
         return
@@ -96,6 +93,22 @@ def find(flight: Flight) -> Iterator[Finding]:
             yield found
             return
     yield from _doubted(flight)
+
+
+def _in_use(flight: Flight) -> list[Table]:
+    """The compasses that are used and say something, while they matter."""
+    return [
+        watched
+        for n, table in enumerate(flight.all("MAG", *AXES), start=1)
+        if len(watched := table.where(flight.watch(table.t))) >= 3
+        and flight.setting("COMPASS_USE" if n == 1 else f"COMPASS_USE{n}") != 0
+        and not all(says_nothing(table[axis]) for axis in AXES)
+    ]
+
+
+def reads_nothing(flight: Flight) -> bool:
+    """Whether the first compass, which is the one in use, gives nothing for a while."""
+    return any(lasting(first.t, _silent(first), _SILENT_S) for first in _in_use(flight)[:1])
 
 
 def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
@@ -108,7 +121,6 @@ def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     start, end = spans[0][0], spans[-1][1]
     others = [other.between(start, end) for other in compasses[1:]]
     replaced = any(len(other) and float(_silent(other).mean()) < 0.5 for other in others)
-    broken = _not_a_number(flight)
     yield Finding(
         kind="compass",
         title="the compass reads nothing",
@@ -117,28 +129,15 @@ def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         severity="critical"
         if not replaced or flight.lost_control_s is not None or _rejected(flight, start)
         else "warning",
-        evidence="the field of compass 1 is zero or marked unhealthy"
-        + (f"; not a number: {', '.join(broken)}" if broken else ""),
+        evidence="the field of compass 1 is zero or marked unhealthy",
         source="MAG",
-        suspect="parameter" if broken else "hardware",
         probability=_DEAD,
-        parameters=broken[:1],  # its axes are one calibration
-        wanted=tuple((name, 0.0) for name in broken[:1]),
     )
 
 
 def _silent(compass: Table) -> Bools:
     silent = ~(length(compass[axis] for axis in AXES) > _NOTHING)
     return silent | (compass["Health"] == 0) if "Health" in compass.columns else silent
-
-
-def _not_a_number(flight: Flight) -> tuple[str, ...]:
-    """The calibrations of the compass that are no numbers, which make every field none."""
-    table = flight.one("PARM", "Name", "Value")
-    if table is None:
-        return ()
-    names = map(str, table["Name"][~np.isfinite(table["Value"])].tolist())
-    return tuple(dict.fromkeys(name for name in names if name.startswith("COMPASS_")))
 
 
 def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:

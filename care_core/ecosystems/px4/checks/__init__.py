@@ -19,6 +19,7 @@ from care_core.ecosystems.px4.checks import (
     lift,
     log,
     motor,
+    not_numbers,
     recorded,
     rotors,
     twist,
@@ -27,6 +28,7 @@ from care_core.ecosystems.px4.checks import (
 from care_core.ecosystems.px4.flight import Px4Flight
 
 CHECKS: tuple[Check[Px4Flight], ...] = (
+    not_numbers.CHECK,
     flags.CHECK,
     estimator.CHECK,
     motor.CHECK,
