@@ -190,7 +190,8 @@ class FaultEntry(Document, kw_only=True):
 class ChangeEntry(Document, kw_only=True):
     option: str
     parameter: str | list[str]
-    from_: int | float = field(name="from")
+    from_: int | float | None = field(name="from")
+    """None where the vehicle had what is not a number."""
     to: int | float
     assumed: bool = False
     """Whether no source holds `from`."""
@@ -199,10 +200,10 @@ class ChangeEntry(Document, kw_only=True):
     @property
     def values(self) -> str:
         """From what to what."""
-        return f"from {self.from_:g}{ASSUMED if self.assumed else ''} to {self.to:g}"
+        return f"from {number_shown(self.from_)}{ASSUMED if self.assumed else ''} to {self.to:g}"
 
     def __str__(self) -> str:
-        return f"{self.option} {self.from_:g}{ASSUMED if self.assumed else ''} -> {self.to:g}"
+        return f"{self.option} {number_shown(self.from_)}{ASSUMED if self.assumed else ''} -> {self.to:g}"
 
 
 class FixSet(Document, kw_only=True):
@@ -274,7 +275,8 @@ class OutsideEntry(Document, kw_only=True):
     """A parameter that the profile does not model, and that may have lost the run."""
 
     name: str
-    value: float
+    value: float | None
+    """None where the vehicle had what is not a number."""
     usual: float
     """The last good run's value, else the firmware's default."""
     text: str
@@ -458,6 +460,16 @@ def plain_number(value: float) -> int | float:
     return int(value) if float(value).is_integer() else float(value)
 
 
+def known_number(value: float) -> int | float | None:
+    """The same, None for what is not a number."""
+    return plain_number(value) if math.isfinite(value) else None
+
+
+def number_shown(value: float | None) -> str:
+    """A number of a document in words."""
+    return "not a number" if value is None else f"{value:g}"
+
+
 def _values(values: Mapping[str, Value]) -> dict[str, float | None]:
     return {name: publishable(float(value)) if is_known(value) else None for name, value in values.items()}
 
@@ -559,7 +571,7 @@ def _change(change: Change) -> ChangeEntry:
     return ChangeEntry(
         option=change.option.name,
         parameter=parameter_names(change.option.parameters),
-        from_=plain_number(parameter_value(change.option, change.current)),
+        from_=known_number(parameter_value(change.option, change.current)),
         to=plain_number(parameter_value(change.option, change.suggested)),
         assumed=change.is_assumed,
         reboot_required=change.option.reboot_required,

@@ -120,8 +120,9 @@ def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str, roles:
         shown = shortened(", ".join(map(clean, named)), 80)
         own = ", ".join(option.parameters)
         raise _strange(f"the change of {option.name} may set {own} alone, not {shown}", path, f"{key}.parameter")
-    before, value = float(change.from_) / driven.scale, float(change.to) / driven.scale
-    if not (math.isfinite(before) and math.isfinite(value)):
+    before = math.nan if change.from_ is None else float(change.from_) / driven.scale
+    value = float(change.to) / driven.scale
+    if math.isinf(before) or not math.isfinite(value):
         raise _strange(f"{option.name} needs a finite number", path, key)
     return SuggestedChange(driven, _digits(before), _digits(value), change.assumed, key)
 

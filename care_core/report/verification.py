@@ -27,6 +27,8 @@ from care_core.report.document import (
     ObjectiveEntry,
     ProfileEntry,
     TriageDocument,
+    known_number,
+    number_shown,
     objective_entry,
     plain_number,
 )
@@ -65,7 +67,8 @@ class CheckedChange(Document, kw_only=True):
     """`driven` is the next run's value, null where the log does not hold it."""
 
     option: str
-    from_: int | float = field(name="from")
+    from_: int | float | None = field(name="from")
+    """None where the vehicle had what is not a number."""
     to: int | float
     driven: int | float | None
     made: Made
@@ -187,7 +190,7 @@ def verify_document(report: TriageDocument, run: Run, found: Verification) -> Ve
 def _change(change: MadeChange) -> CheckedChange:
     return CheckedChange(
         option=change.option.name,
-        from_=plain_number(change.before),
+        from_=known_number(change.before),
         to=plain_number(change.wanted),
         driven=None if change.driven is None else plain_number(change.driven),
         made=change.made,
@@ -242,7 +245,9 @@ def _changes_title(document: VerifyDocument) -> str:
 def _change_line(change: CheckedChange) -> str:
     driven = "" if change.driven is None or change.made == "made" else f" ({change.driven:g} was driven)"
     note = f"; {change.note}" if change.note else ""
-    return f"{_MADE_WORDS[change.made]:<14}  {change.option}  {change.from_:g} -> {change.to:g}{driven}{note}"
+    return (
+        f"{_MADE_WORDS[change.made]:<14}  {change.option}  {number_shown(change.from_)} -> {change.to:g}{driven}{note}"
+    )
 
 
 def _other_line(other: OtherChangeEntry) -> str:
