@@ -11,7 +11,7 @@ from care_core.application.plotting import MOST_PLOTS, marks_in, ranked, segment
 from care_core.application.proof import meanings
 from care_core.application.sharing import EVERYTHING, Sharing
 from care_core.application.signals import Line as Values
-from care_core.application.signals import Signal, Source, lines_of, whole_of
+from care_core.application.signals import Signal, Source, shown_lines, whole_of
 from care_core.errors import UsageError, nearest
 from care_core.progress import Progress
 from care_core.records import Record, replace
@@ -185,7 +185,7 @@ def beside(a: Request, other: Case, progress: Progress) -> Compared:
 def _from_start(case: OpenRun, sources: Sequence[Source]) -> Mapping[Source, Values]:
     """The numbers of signals during the mission, in seconds from its start; without those that the log lacks."""
     start_s, end_s = whole_of(case)
-    found = lines_of(case, sources, (start_s, end_s))
+    found = shown_lines(case, sources, (start_s, end_s))
     return {source: (line[0] - start_s, line[1]) for source, line in found.items() if line is not None and len(line[1])}
 
 

@@ -10,7 +10,7 @@ from care_core.application.open_run import OpenRun
 from care_core.application.proof import finding_score, meanings
 from care_core.application.responses import responses_of
 from care_core.application.sharing import EVERYTHING, Sharing
-from care_core.application.signals import LONGEST_GAP, Signal, Source, lines_of, settled_s, signals_of, whole_of
+from care_core.application.signals import LONGEST_GAP, Signal, Source, settled_s, shown_lines, signals_of, whole_of
 from care_core.application.signals import Line as Values
 from care_core.numbers import Floats, median
 from care_core.records import replace
@@ -68,7 +68,7 @@ def drawn_of(case: OpenRun, sharing: Sharing = EVERYTHING) -> Drawing:
     first = max(min(telling, MOST_PLOTS), FEWEST)
     chosen = [(group, place < first) for place, group in enumerate(groups[: first + MOST_OTHERS])]
     sources = [source for group, _ in chosen for source in sources_of(group)]
-    values = lines_of(case, sources, span)
+    values = shown_lines(case, sources, span)
     plots = [_plot(case, group, values, span, matters=matters) for group, matters in chosen]
     text = sharing.text(case)
     return Drawing(

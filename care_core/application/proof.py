@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from care_core.application.open_run import OpenRun, log_of
-from care_core.application.signals import Signal, signals_of
+from care_core.application.signals import Signal, as_read, signals_of
 from care_core.diagnose.records import Cause, ObjectiveResult
 from care_core.ecosystems.dictionary import Field
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
@@ -99,13 +99,18 @@ class Proof(Record):
 
 
 def meanings(case: OpenRun) -> Meaning:
-    """What a signal of a run's log means, by channel and field; what a dictionary lacks is judged by its name."""
+    """What a signal of a run's log means, by channel and field, in the unit in which it is shown; what a dictionary
+    lacks is judged by its name."""
     log = log_of(case)
     ecosystem, channels = ecosystem_of(log.format), {channel.name: channel for channel in log.channels()}
 
     def meaning(name: str, field: str) -> Field:
         found = (ecosystem.field(channels[name], field) if name in channels else None) or Field()
-        return replace(found, is_position=found.is_position or _POSITION.search(field) is not None)
+        return replace(
+            found,
+            unit=as_read(log, found.unit)[0],
+            is_position=found.is_position or _POSITION.search(field) is not None,
+        )
 
     return meaning
 

@@ -235,7 +235,7 @@ def trace_of(case: OpenRun, signal: Signal, span: tuple[float, float], columns: 
         CareError: the log holds no number there.
     """
     sources = [(signal.channel, signal.field), *([signal.wanted] if signal.wanted else [])]
-    found = lines_of(case, sources, span)
+    found = shown_lines(case, sources, span)
     lines = [found[source] for source in sources]
     if lines[0] is None:
         raise CareError(f"The log holds no numbers in {signal.name}.", hint="Choose another signal.")
@@ -265,6 +265,34 @@ def lines_of(case: OpenRun, sources: Iterable[Source], span: tuple[float, float]
         asked.setdefault(channel, [] if channel.startswith("/") else list(SELECTORS)).append(field)
     tables = log_of(case).read(asked)
     return {(channel, field): _line(tables.get(channel), field, span) for channel, field in wanted}
+
+
+_AS_READ: Mapping[str, tuple[str, float]] = {
+    "rad": ("deg", math.degrees(1.0)),
+    "rad/s": ("deg/s", math.degrees(1.0)),
+    "mV": ("V", 1e-3),
+    "cA": ("A", 1e-2),
+}
+"""Units of the wire, those that people read instead, and what makes these of them."""
+
+
+def as_read(log: Log, unit: str) -> tuple[str, float]:
+    """The unit in which people read a signal, and the factor to it. Parameters of ROS robots are in radians."""
+    return (unit, 1.0) if log.format.ecosystem == "ros" else _AS_READ.get(unit, (unit, 1.0))
+
+
+def shown_lines(case: OpenRun, sources: Iterable[Source], span: tuple[float, float]) -> dict[Source, Line | None]:
+    """The same as `lines_of` in the units in which they are shown."""
+    from care_core.ecosystems.registry import ecosystem_of
+
+    log, found = log_of(case), lines_of(case, sources, span)
+    ecosystem, channels = ecosystem_of(log.format), {channel.name: channel for channel in log.channels()}
+    for (channel, field), line in found.items():
+        known = ecosystem.field(channels[channel], field) if channel in channels else None
+        factor = 1.0 if known is None else as_read(log, known.unit)[1]
+        if line is not None and factor != 1.0:
+            found[channel, field] = line[0], line[1] * factor
+    return found
 
 
 def _line(table: Table | None, field: str, span: tuple[float, float]) -> Line | None:

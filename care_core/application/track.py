@@ -7,16 +7,23 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from care_core.application.open_run import OpenRun, log_of
-from care_core.application.signals import Source, lines_of, type_name, whole_of
+from care_core.application.signals import Source, lines_of, settled_s, type_name, whole_of
 from care_core.errors import CareError
 from care_core.geodesy import offset_m
-from care_core.records import Record
+from care_core.records import Record, replace
 
 if TYPE_CHECKING:
     from care_core.ecosystems.ros.goals import Goal
     from care_core.numbers import Floats
 
-_GLOBAL = (("POS", "Lat", "Lng"), ("GPS", "Lat", "Lng"), ("vehicle_global_position", "lat", "lon"))
+_GLOBAL = (
+    ("POS", "Lat", "Lng", 1.0),
+    ("GPS", "Lat", "Lng", 1.0),
+    ("vehicle_global_position", "lat", "lon", 1.0),
+    ("GLOBAL_POSITION_INT", "lat", "lon", 1e-7),
+    ("GPS_RAW_INT", "lat", "lon", 1e-7),
+)
+"""Channels that hold a place on the globe, north and east, and what makes degrees of their numbers."""
 _ITEMS = {
     "CMD": ("CNum", "Lat", "Lng"),
     "navigator_mission_item": ("sequence_current", "latitude", "longitude"),
@@ -47,13 +54,32 @@ class Way(Record):
 
 
 def way_of(case: OpenRun) -> Way:
-    """Where the robot went in the mission. Raises CareError where the log does not say."""
+    """Where the robot went in the mission. What comes after a crash or a landing is left out where it leads away: it is
+    where an estimator without a vehicle went. Raises CareError where the log does not say."""
+    return _while_it_went(_recorded(case), settled_s(case.diagnosis))
+
+
+def _while_it_went(way: Way, end_s: float) -> Way:
+    went = [point for point, time_s in zip(way.track, way.times_s, strict=True) if time_s <= end_s]
+    if len(went) < 2:
+        return way
+    (west, east), (south, north) = ((min(side), max(side)) for side in zip(*went, *way.legs, strict=True))
+    kept = [
+        (point, time_s)
+        for point, time_s in zip(way.track, way.times_s, strict=True)
+        if time_s <= end_s or (west <= point[0] <= east and south <= point[1] <= north)
+    ]
+    return replace(way, track=tuple(point for point, _ in kept), times_s=tuple(time_s for _, time_s in kept))
+
+
+def _recorded(case: OpenRun) -> Way:
     span, present = whole_of(case), {channel.name: channel.type for channel in log_of(case).channels() if channel.count}
-    for channel, north, east in _GLOBAL:
-        if channel in present:
-            found = _track(case, (channel, east), (channel, north), span)
-            if found is not None:
-                return _on_the_ground(*found, _flown_to(case, present))
+    for channel, north, east, degrees in _GLOBAL:
+        found = _track(case, (channel, east), (channel, north), span) if channel in present else None
+        placed = None if found is None else _placed(*found)
+        if placed is not None:
+            t, lng, lat = placed
+            return _on_the_ground(t, lng * degrees, lat * degrees, _flown_to(case, present))
     for channel, x, y in _LOCAL:
         found = _track(case, (channel, x), (channel, y), span) if channel in present else None
         if found is not None:
@@ -73,6 +99,12 @@ def _track(case: OpenRun, x: Source, y: Source, span: tuple[float, float]) -> tu
         return None
     some = np.unique(np.linspace(0, len(across[0]) - 1, min(_MOST, len(across[0]))).astype(int))
     return across[0][some], across[1][some], along[1][some]
+
+
+def _placed(t: Floats, lng: Floats, lat: Floats) -> tuple[Floats, Floats, Floats] | None:
+    """A track without what stands at 0, 0, as a vehicle says that knows no place; None where nothing is left."""
+    known = (lng != 0.0) | (lat != 0.0)
+    return (t[known], lng[known], lat[known]) if known.sum() > 1 else None
 
 
 def _on_the_ground(t: Floats, lng: Floats, lat: Floats, corners: tuple[Point, ...]) -> Way:

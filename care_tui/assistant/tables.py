@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from care_core.application.plotting import ranked
 from care_core.application.proof import meanings
-from care_core.application.signals import Source, lines_of, signals_of, whole_of
+from care_core.application.signals import Source, shown_lines, signals_of, whole_of
 from care_core.errors import UsageError, nearest
 from care_core.text import figures
 
@@ -56,7 +56,7 @@ def signal_table(case: Case, names: Sequence[str], start_s: float, end_s: float,
         if name not in known:
             hint = nearest(name, known) or "Call 'signals' without names: it lists them."
             raise UsageError(f"The log has no signal '{name}'.", hint=hint)
-    found = lines_of(case, [known[name] for name in names], span)
+    found = shown_lines(case, [known[name] for name in names], span)
     columns = [list(_parts(found[known[name]], span, rows)) for name in names]
     head = ",".join(("from_s", "to_s", *(f"{name} {part}" for name in names for part in ("mean", "min", "max"))))
     step = (span[1] - span[0]) / rows

@@ -1,4 +1,4 @@
-"""The answer of a run in at most five lines: the fault, its cause, the change with its odds, and what limits it."""
+"""The answer of a run in few lines: the fault, its cause, the change with its odds, what is next, what limits it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from textual.content import Content
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.diagnose.verdict import LINE, fit_line, hypothesis_text, verdict_of
 from care_core.ecosystems.findings import every_finding
-from care_core.text import clean
+from care_core.text import clean, listed
 from care_tui.render.health import warnings_of
 from care_tui.render.odds import bar, promise
 from care_tui.render.rows import Glyphs, change_text, percent, progress_bar, status, text
@@ -24,8 +24,8 @@ _LEAST = 12
 """Cells that are left of a change, however narrow the terminal."""
 
 
-def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) -> list[Content]:
-    """The answer as far as it is known; `is_low`: there is room for few lines."""
+def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool, is_tall: bool = False) -> list[Content]:
+    """The answer as far as it is known; `is_low`: there is room for few lines, `is_tall`: for every one of them."""
     name = "" if session.path is None else clean(session.path.name)
     if session.state == "empty":
         return [
@@ -42,7 +42,10 @@ def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) 
         head = Content.assemble("Reading ", (name, "bold"), ("  esc stops", "dim"))
         return [head, progress_bar(fraction, glyphs) + text(f"  {step}")]
     lines = [_head(session.diagnosis, glyphs, width), *_cause_and_change(session, glyphs, width, is_low=is_low)]
-    return [*lines, *_limits(session.diagnosis, width, is_low=is_low)]
+    next_step = verdict_of(session.diagnosis).next_step
+    if next_step and not is_low:
+        lines.append(_labelled("Next") + text(next_step))
+    return [*lines, *_limits(session.diagnosis, width, is_tall=is_tall)]
 
 
 def _head(diagnosis: Diagnosis, glyphs: Glyphs, width: int) -> Content:
@@ -121,15 +124,27 @@ def _change(session: Session, glyphs: Glyphs, width: int) -> Content | None:
     return head + _cut(what, max(room - tail.cell_length, _LEAST), glyphs) + more + tail
 
 
-def _limits(diagnosis: Diagnosis, width: int, *, is_low: bool) -> Iterator[Content]:
-    """What limits the answer, where something does."""
-    fit = diagnosis.profile.fit
-    found = warnings_of(diagnosis)
+def _limits(diagnosis: Diagnosis, width: int, *, is_tall: bool) -> Iterator[Content]:
+    """What the answer does not tell, the gravest first: each in a line where there is room, else all of it in one."""
+    fit, warnings = diagnosis.profile.fit, warnings_of(diagnosis)
+    told = list(_worse(diagnosis, is_tall=is_tall))
     if fit.verdict != "fits":
-        style = "$text-warning" if fit.verdict == "partly" else "bold $text-error"
-        yield Content.styled(_MARK + clean(fit_line(diagnosis.profile.title, fit, line=_room_of_fit(width))), style)
-    if found and not (is_low and fit.verdict != "fits"):
-        yield Content.styled(_MARK + clean("; ".join(found)), "$text-warning")
+        told.append(fit_line(diagnosis.profile.title, fit, line=_room_of_fit(width)))
+    told += ["; ".join(warnings)] if warnings else []
+    style = "bold $text-error" if fit.verdict == "no" else "$text-warning"
+    for line in told if is_tall or not told else ["; ".join(told)]:
+        yield Content.styled(_MARK + clean(line), style)
+
+
+def _worse(diagnosis: Diagnosis, *, is_tall: bool) -> Iterator[str]:
+    """That another mission of the log failed, and where it is told."""
+    own = diagnosis.run.mission.index
+    failed = [one for one in diagnosis.missions if one.status == "fault" and one.mission.index != own]
+    if failed:
+        numbers = listed([str(one.mission.index) for one in failed])
+        missions = "missions" if len(failed) > 1 else "mission"
+        why = f": {failed[0].reason}" if is_tall and len(failed) == 1 else ""
+        yield f"FAULT in {missions} {numbers} of this log, too (t){why}"
 
 
 def _room_of_fit(width: int) -> int:

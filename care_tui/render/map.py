@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
@@ -16,8 +17,10 @@ from care_tui.render.rows import ASCII, Glyphs, Row, Rows
 
 _TALL = 2.0
 """How much higher than wide a cell is."""
-_RULER = 10
-"""Cells of the ruler."""
+_RULER, _ABOUT = 14, 1.0 + 1e-9
+"""Cells of the ruler at most, and what rounding adds to a power of ten."""
+_OTHERWISE = {"E": "!"}
+"""Signs of moments that mean something else on a map."""
 _LEAST_M = 2.0
 """Metres that a map shows at least: a robot that stood has not wandered all over it."""
 
@@ -68,7 +71,8 @@ def map_rows(
     Args:
         here_s: the time of which the place is marked, seconds of the log.
     """
-    told = [(_at(way, mark.time_s), sign_of(mark, glyphs)) for mark in marks]
+    signs = [sign_of(mark, glyphs) for mark in marks]
+    told = [(_at(way, mark.time_s), _OTHERWISE.get(sign, sign)) for mark, sign in zip(marks, signs, strict=True)]
     legend = _legend(way, {sign for _, sign in told}, glyphs, is_here=here_s is not None)
     room = 1 + len(Rows([legend]).wrap(width))
     canvas = _Canvas(way, width, max(height - room, 4), ascii=glyphs is ASCII)
@@ -83,15 +87,26 @@ def map_rows(
         x, y = canvas.dot(point)
         drawn[x // canvas.across, y // canvas.down] = sign, "bold $text-error" if sign == glyphs.fault else "bold"
     rows = [Row(assembled([drawn.get((x, y), (" ", "")) for x in range(canvas.width)])) for y in range(canvas.height)]
-    scale = f"{glyphs.rule * _RULER} {figures(canvas.metres * _RULER, 2)} m"
-    return [*rows, Row(Content(scale)), legend]
+    return [*rows, Row(Content(_scale(canvas.metres, glyphs))), legend]
+
+
+def _scale(metres: float, glyphs: Glyphs) -> str:
+    """A bar as long as the longest of 1, 2 or 5 metres, or tens of them, that is no longer than the ruler.
+
+    Args:
+        metres: that a cell is wide.
+    """
+    power = 10.0 ** math.floor(math.log10(metres * _RULER))
+    long = max(step * power for step in (1, 2, 5) if step * power <= metres * _RULER * _ABOUT)
+    return f"{glyphs.rule * max(round(long / metres), 1)} {figures(long, 2)} m"
 
 
 def _legend(way: Way, seen: Collection[str], glyphs: Glyphs, *, is_here: bool) -> Row:
     """What the signs of a map mean."""
     asked = ("  ... asked for, o its corners", WANTED) if way.legs else ""
     here = "  @ here" if is_here else ""
-    meant = "".join(f"  {sign} {word}" for sign, word in ((glyphs.fault, "fault"), ("!", "warning")) if sign in seen)
+    words = ((glyphs.fault, "fault"), ("!", "warning"), ("C", "crash"), ("F", "failsafe"), ("R", "recovery"))
+    meant = "".join(f"  {sign} {word}" for sign, word in words if sign in seen)
     return Row(Content.assemble((f"{glyphs.root} track", ACTUAL), "  S start  E end", here, meant, asked))
 
 

@@ -11,7 +11,7 @@ import pytest
 import care_core
 from care_core.application.case import Case
 from care_core.application.open_run import Reading
-from care_core.diagnose.records import Diagnosis, Fix
+from care_core.diagnose.records import Diagnosis, Fix, MissionVerdict
 from care_core.diagnose.whatif import question
 from care_core.history.store import Triaged
 from care_core.records import replace
@@ -22,7 +22,7 @@ from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
 from care_core.report.whatif import whatif_document, whatif_text
 from care_core.report.writers import published, to_json, to_yaml
-from care_core.run import Fit, FitVerdict
+from care_core.run import Damage, Fit, FitVerdict
 from care_tui.render.answer import answer_lines
 from care_tui.render.causes import cause_item, worth_rows
 from care_tui.render.fix import option_change, outcome_rows
@@ -93,6 +93,28 @@ def test_every_output_says_how_well_the_profile_fits_behind_its_verdict(
     answer = asked.ask({OPTION: 40.0})
     assert whatif_text(asked, answer).startswith(expected)
     assert list(json.loads(whatif_document(asked, answer).to_json()))[:2] == ["schema", "fit"]
+
+
+def test_the_app_pins_the_next_step_and_the_worse_mission_and_one_line_of_limits() -> None:
+    made = made_diagnosis()
+    limited = replace(made.profile, fit=Fit("partly", ("old firmware",)))
+    own = made.run.mission
+    worse = MissionVerdict(replace(own, index=own.index + 1, count=2), "fault", "it crashed")
+    run = replace(made.run, log=replace(made.run.log, damage=(Damage("3 bytes are no packets"),)))
+    session = opened(replace(made, run=run, profile=limited, missions=(worse,)))
+
+    def pinned(*, is_low: bool, is_tall: bool) -> list[str]:
+        lines = answer_lines(session, UNICODE, 119, is_low=is_low, is_tall=is_tall)
+        return [line.plain for line in lines]
+
+    usual = pinned(is_low=False, is_tall=False)
+    assert any(line.startswith("Next     make the change") for line in usual)
+    (limits,) = (line for line in usual if line.startswith("! "))
+    assert limits.startswith(f"! FAULT in mission {own.index + 1} of this log, too (t); Profile arducopter partly fits")
+    tall = [line for line in pinned(is_low=False, is_tall=True) if line.startswith("! ")]
+    assert len(tall) == 3
+    assert tall[0].endswith("too (t): it crashed")
+    assert not any(line.startswith("Next") for line in pinned(is_low=True, is_tall=False))
 
 
 def test_the_odds_without_a_change_are_never_cut_off() -> None:

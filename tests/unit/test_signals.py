@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.application.case import Case
-from care_core.application.signals import Signal, signals_of, trace_of, whole_of
+from care_core.application.proof import meanings
+from care_core.application.signals import Signal, lines_of, shown_lines, signals_of, trace_of, whole_of
 from care_core.application.viewing import messages_of
 from care_core.errors import CareError
 from care_core.logs import formats
@@ -26,6 +29,19 @@ def test_without_a_profile_the_signals_that_are_known_come_with_what_they_were_t
     log = MadeLog({"ATT": {"Pitch": T, "Roll": T, "DesRoll": T}, "VIBE": {"VibeZ": T}, "XYZ": {"Q": T}})
     found = [(one.name, one.wanted_name) for one in signals_of(case_of(log))]
     assert found == [("ATT Roll", "DesRoll"), ("ATT Pitch", ""), ("VIBE VibeZ", "")]
+
+
+def test_a_vehicles_signals_are_shown_in_the_units_that_people_read() -> None:
+    log = MadeLog({"ATTITUDE": {"roll": T, "pitch": T}, "SYS_STATUS": {"voltage_battery": T}})
+    case, span = case_of(replace(log, format=formats.MAVLINK_TLOG)), (0.0, 100.0)
+    roll, volts = ("ATTITUDE", "roll"), ("SYS_STATUS", "voltage_battery")
+    raw, shown = lines_of(case, (roll, volts), span), shown_lines(case, (roll, volts), span)
+    for source, factor, unit in ((roll, math.degrees(1.0), "deg"), (volts, 1e-3, "V")):
+        before, after = raw[source], shown[source]
+        assert before is not None
+        assert after is not None
+        assert after[1].tolist() == pytest.approx((before[1] * factor).tolist())
+        assert meanings(case)(*source).unit == unit
 
 
 def test_odometry_is_drawn_over_the_velocity_command_by_the_types_of_the_topics() -> None:
