@@ -170,6 +170,10 @@ FitVerdict = Literal["fits", "partly", "no"]
 FIT_WORDS: Mapping[FitVerdict, str] = {"fits": "fits", "partly": "partly fits", "no": "does not fit"}
 
 
+NO_PROFILE_FOR = "no profile is for "
+"""How a reason ends where it is the kind of vehicle that nobody has learned a profile of."""
+
+
 class Fit(Record):
     """How well a profile fits a log: "partly" caps every confidence at low, with "no" nothing is advised."""
 

@@ -112,6 +112,7 @@ def open_case(request: Request, progress: Progress) -> Case:
     from care_core.configs.loading import read_configs
     from care_core.ecosystems.examine import examine
     from care_core.errors import NoMissionError
+    from care_core.extract.coverage import lacking_of_missions
     from care_core.run import Fit
 
     configs = read_configs(request.configs)
@@ -128,6 +129,8 @@ def open_case(request: Request, progress: Progress) -> Case:
                 reading = _read(model, profile, choice, health, request, configs, progress, sha256)
             except NoMissionError as err:
                 reason = err.message[:1].lower() + err.message[1:].rstrip(".")
+                if any(event.kind == "mission" for event in health.timeline):
+                    reason = lacking_of_missions(log, profile.schema)
                 choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, reason)))
         robot = _robot(log, request)
         if reading is None:

@@ -16,13 +16,14 @@ from care_core.diagnose.records import Circumstance
 from care_core.profile.schema import Schema, Side
 from care_core.profile.store import Profile
 from care_core.run import Run, is_known
-from care_core.text import figures
+from care_core.text import figures, first_of
 from care_core.variables import Role, Variable
 
 BEYOND = 0.1
 """Share of the range that training saw by which a context may leave it before the profile fits only in part."""
 NEAR = 0.02
 """Share of its value by which a context that hardly varied in training may differ."""
+NO_MISSION = "no mission was flown"
 RARE = 0.025
 """Share of the training runs that lie farther out than what is called unusual."""
 
@@ -39,6 +40,7 @@ def circumstances(run: Run, query: CounterfactualQuery, schema: Schema) -> tuple
 def unusual(run: Run, profile: Profile) -> tuple[str, ...]:
     """What of this mission the profile does not know: another mission, conditions beyond its training."""
     found = [run.mission.mismatch] if run.mission.mismatch and not profile.schema.travels else []
+    constant: list[str] = []
     for variable in profile.schema.contexts:
         value, summary = run.context.get(variable.name), profile.model.summaries.get(variable.name)
         is_asked = run.checks and variable.about == "mission"  # of a flight that followed no mission
@@ -46,10 +48,19 @@ def unusual(run: Run, profile: Profile) -> tuple[str, ...]:
             continue
         low, high = _range_seen(variable, summary)
         margin = max(BEYOND * (high - low), NEAR * abs(high))
-        if not low - margin <= value <= high + margin:
+        if not low - margin <= value <= high + margin and figures(low) == figures(high):
+            constant.append(f"{variable.doc or variable.name} ({figures(low)} {variable.unit}".rstrip() + ")")
+        elif not low - margin <= value <= high + margin:
             what = f"{variable.doc or variable.name} of {figures(value)} {variable.unit}".rstrip()
             found.append(f"{what} is outside the training runs ({_seen(low, high)})")
-    return tuple(found)
+    # A mission that was not flown, and what training could not learn anything of, say more of the odds than of the run.
+    if constant:
+        found.append(f"it was learned {_where_learned(profile)} that never varied {first_of(constant, 2)}")
+    return (NO_MISSION, *found) if found and run.checks else tuple(found)
+
+
+def _where_learned(profile: Profile) -> str:
+    return "in a simulator" if "simulated" in profile.schema.doc else "from runs"
 
 
 def battery_is_low(run: Run, model: Model, schema: Schema) -> bool | None:

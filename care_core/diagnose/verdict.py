@@ -18,7 +18,7 @@ from care_core.ecosystems.findings import WHOLE_LOG, FindingKind, Severity, Susp
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
 from care_core.records import Record, replace
-from care_core.run import FIT_WORDS, Fit, FitVerdict
+from care_core.run import FIT_WORDS, NO_PROFILE_FOR, Fit, FitVerdict
 from care_core.text import clean, listed, log_time, percent
 
 RunStatus = Status | Literal["unreadable"]
@@ -428,7 +428,8 @@ def fit_words(profile: str, verdict: FitVerdict) -> str:
 def fit_line(profile: str, fit: Fit, lines: int = 1, line: int = LINE) -> str:
     """The same in so many lines of so many cells at most: the first reason, and how many more stand below."""
     if not profile:
-        return f"No profile fits this log: {NO_LIMITS}"
+        unknown = (one[one.index(NO_PROFILE_FOR) :] for one in fit.reasons if NO_PROFILE_FOR in one)
+        return f"No profile fits this log: {next(unknown, NO_LIMITS)}"
     if not fit.reasons:
         return fit_words(profile, fit.verdict)
     more = f" (and {len(fit.reasons) - 1} more)" if len(fit.reasons) > 1 else ""

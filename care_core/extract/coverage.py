@@ -13,7 +13,7 @@ from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.run import MissionInfo, Run, Unavailable
-from care_core.text import first_of
+from care_core.text import first_of, listed
 from care_core.variables import Role, Variable
 
 
@@ -119,7 +119,13 @@ def wrong_kind(log: Log, schema: Schema) -> str:
 def _no_mission(schema: Schema, channels: Collection[str]) -> str:
     """Which of the messages that missions are found by are not in the log; '' when all are."""
     absent = [name for name in mission_kind(schema).needs(schema.mission) if name not in channels]
-    return f"no mission was found; of what tells of missions {', '.join(absent)} are not in the log" if absent else ""
+    lacking = f"of what tells of missions {listed(absent)} {'are' if len(absent) > 1 else 'is'} not in the log"
+    return f"no whole mission was found; {lacking}" if absent else ""
+
+
+def lacking_of_missions(log: Log, schema: Schema) -> str:
+    """What is missing of a mission that the log shows in part, in a clause."""
+    return _no_mission(schema, _channels(log)) or "no whole mission was found: the log begins or ends within one"
 
 
 def _missed_options(log: Log, schema: Schema) -> list[Missed]:

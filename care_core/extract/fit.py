@@ -11,7 +11,7 @@ from care_core.ecosystems.vehicles import UNLIKE_ROVERS, Vehicle, vehicle_of
 from care_core.extract.coverage import Coverage, wrong_kind
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
-from care_core.run import FITS, Fit, Settings
+from care_core.run import FITS, NO_PROFILE_FOR, Fit, Settings
 
 MOST = 0.7
 """Share of a profile's options, and of its sources, that a log holds when it fits: some sources stand in for others,
@@ -49,7 +49,8 @@ def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle, settings: Setting
     elif is_other_vehicle(schema, vehicle):
         yield f"it is for {_a(schema.match['vehicle'])}, this is {_a(vehicle.kind)}"
     elif (airframe := schema.match.get("airframe")) and log.facts.get("vehicle", airframe) != airframe:
-        yield f"it is for {_a(airframe)}, this is {_a(log.facts['vehicle'])}"
+        none = f", and {NO_PROFILE_FOR}VTOLs of PX4" if log.facts["vehicle"] == "VTOL" else ""
+        yield f"it is for {_a(airframe)}, this is {_a(log.facts['vehicle'])}{none}"
     elif other := _other_plugin(schema, settings):
         yield other
     elif not coverage.found:

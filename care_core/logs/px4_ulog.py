@@ -51,6 +51,7 @@ LEVELS = ("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "NOTICE", "INFO"
 _SETUP_DEFAULT = 2
 """Bit of a default's record that is the airframe's. One of the firmware alone (bit 1) is written where the airframe has
 a default of its own that the value does not differ from (`Logger::write_parameter_defaults`)."""
+_VTOL = "VTOL"
 _VEHICLE_TYPES = {1: "multicopter", 2: "fixed wing", 3: "rover", 4: "airship"}
 _GPS_TOPICS = ("vehicle_gps_position", "sensor_gps")
 _EARLIEST_S = datetime(2005, 1, 1, tzinfo=timezone.utc).timestamp()
@@ -167,9 +168,11 @@ class Px4Log:
             if isinstance(value := self._info.get(key), str):
                 facts[fact] = value
         if (own := self._channels.get("vehicle_status")) is not None:
-            last = self._tables({"": (_rows(own, slice(-1, None)), ("vehicle_type",))})[""]
+            last = self._tables({"": (_rows(own, slice(-1, None)), ("vehicle_type", "is_vtol"))})[""]
             if "vehicle_type" in last.columns:
                 facts["vehicle"] = _VEHICLE_TYPES.get(int(last["vehicle_type"][-1]), "")
+            if "is_vtol" in last.columns and last["is_vtol"][-1]:  # its type is that of how it flies just now
+                facts["vehicle"] = _VTOL
         return {key: text for key, text in facts.items() if text}
 
     @cached_property

@@ -56,7 +56,7 @@ class ReportPage(DiagnosisPage):
         if isinstance(text, CareError):
             return View(title, lambda _: error_rows(text))
         if not isinstance(text, str):
-            return View(title, lambda _: sentence("Writing..."))
+            return View(title, lambda _: sentence("Preparing the preview..."))
         if not text:
             return View(title, lambda _: sentence("Nothing changes, so there is no patch."))
         return View(title, lambda _: plain_rows(text))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 
 from care_core.logs.opening import open_log
 from care_core.logs.px4_ulog import Px4Log
-from tests.rewritten import write_ulog
+from tests.rewritten import ULOG_MAGIC, ulog_record, write_ulog
 from tests.whole import one_in
 
 
@@ -113,3 +114,13 @@ def test_agrees_with_pyulog_on_a_written_log(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", one_in(2, RECORDED), ids=lambda path: path.stem)
 def test_agrees_with_pyulog(path: Path) -> None:
     assert_agrees(path)
+
+
+@pytest.mark.parametrize(("is_vtol", "vehicle"), [(1, "VTOL"), (0, "multicopter")])
+def test_a_vtol_is_one_however_it_flies_just_now(tmp_path: Path, is_vtol: int, vehicle: str) -> None:
+    parts = [ULOG_MAGIC + struct.pack("<Q", 1_000_000), ulog_record(b"B", bytes(40))]
+    parts.append(ulog_record(b"F", b"vehicle_status:uint64_t timestamp;uint8_t vehicle_type;bool is_vtol;"))
+    parts.append(ulog_record(b"A", b"\x00" + struct.pack("<H", 5) + b"vehicle_status"))
+    parts += [ulog_record(b"D", struct.pack("<HQBB", 5, 1_000_000 + n * 500_000, 1, is_vtol)) for n in range(9)]
+    (tmp_path / "a.ulg").write_bytes(b"".join(parts))
+    assert open_log(tmp_path / "a.ulg").facts["vehicle"] == vehicle

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from care_core.causal.model import Summary
+from care_core.diagnose.circumstances import unusual
+from care_core.diagnose.verdict import fit_line
 from care_core.errors import ProfileError
 from care_core.extract.coverage import cover
 from care_core.extract.read import reading_plan
@@ -15,9 +20,12 @@ from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.formats import LogFormat
 from care_core.profile.schema import Schema
+from care_core.profile.store import Profile
 from care_core.records import Record, Struct, field, replace
-from care_core.run import FITS, Damage, Fit, Setting
+from care_core.run import FITS, Damage, Fit, Run, Setting
+from care_core.run import Check as RunCheck
 from care_core.variables import Role, Variable
+from tests.planted import planted_run
 
 SOURCES = tuple(
     reading_plan(Schema("", "", "", "", {}, ("dataflash-bin",), False, {"kind": "ardupilot_flight"}, (), {}))
@@ -138,3 +146,40 @@ def test_a_boat_fits_a_rovers_profile_in_part() -> None:
     assert choose_profile(log, [rover])[1].fit == FITS
     boat = NamedLog(("A",), SOURCES, {"firmware": "ArduRover V4.5.4", "vehicle": "boat"})
     assert choose_profile(boat, [rover])[1].fit == Fit("partly", ("this is a boat, the profile was learned on wheels",))
+
+
+def test_a_vtol_is_told_that_no_profile_is_for_it() -> None:
+    """On PX4, whose multicopters have one: however it flies just now."""
+    copter = candidate("px4", "A", match={"airframe": "multicopter"})
+    log = NamedLog(("A",), SOURCES, {"vehicle": "VTOL"})
+    chosen, choice = choose_profile(log, [copter, candidate("other", "B", match={"airframe": "boat"})])
+    assert chosen is None
+    assert fit_line(choice.name, choice.fit) == "No profile fits this log: no profile is for VTOLs of PX4"
+
+
+def whole(low: float, high: float) -> Summary:
+    return Summary(count=100, mean=low, sd=1.0, quantiles=(low, high))
+
+
+def test_what_training_never_varied_is_said_once_and_last() -> None:
+    """Who flies a real vehicle can do nothing about the constants of a simulator."""
+    contexts = [Variable(name, Role.CONTEXT, unit="V") for name in ("battery", "dilution", "accuracy", "wind")]
+    schema = replace(candidate("copter").schema, variables={one.name: one for one in contexts})
+    summaries = {"battery": whole(12.6, 12.6), "dilution": whole(1.21, 1.21), "accuracy": whole(0.9, 0.9),
+                 "wind": whole(0.0, 9.0)}  # fmt: skip
+    run = planted_run()
+    run = replace(run, context={"battery": 16.1, "dilution": 0.6, "accuracy": 0.5, "wind": 20.0})
+
+    def told(run: Run, doc: str = "Learned from simulated flights.") -> tuple[str, ...]:
+        model = SimpleNamespace(summaries=summaries)
+        return unusual(run, cast("Profile", SimpleNamespace(schema=replace(schema, doc=doc), model=model)))
+
+    wind, constant = told(run)
+    assert wind == "wind of 20 V is outside the training runs (0 to 9)"
+    assert constant == (
+        "it was learned in a simulator that never varied battery (12.6 V), dilution (1.21 V) and 1 more"
+    )
+    assert told(run, "Learned in the field.")[1].startswith("it was learned from runs that never varied battery")
+    flown = replace(run, checks=(RunCheck("armed", 1.0, "it armed"),))
+    assert told(flown)[0] == "no mission was flown"
+    assert told(replace(flown, context={})) == (), "which alone is no objection"
