@@ -44,8 +44,8 @@ OTHER_NEED = 0.1
 HOME_M = 10.0
 """A way that begins or ends at home is as much longer or shorter where a vehicle is put down elsewhere on its field."""
 _FROM_HOME = ("path_length", "return_distance")
-_ONE_BY_ONE = "goals_asked"
-"""Extractor of what is sent goal by goal: a mission that is given up asks for less than all of it."""
+_ONE_BY_ONE = ("goals_asked", "px4_mission_asked")
+"""Extractors of what a log names as it is begun: a mission that is given up asks for less than all of it."""
 
 NOT_HELD = Before(None, "not_evaluated", None)
 """An objective of which the report says nothing."""
@@ -212,7 +212,7 @@ def _asked_otherwise(promise: Promise, run: Run, schema: Schema) -> Iterator[str
     given_up = any(promise.objectives.get(name, NOT_HELD).status == "fault" for name in functional)
     for name, now in run.mission.asked:
         extract, unit = schema.variables[name].extract, schema.variables[name].unit
-        if extract is None or name not in promise.context or (given_up and extract.kind == _ONE_BY_ONE):
+        if extract is None or name not in promise.context or (given_up and extract.kind in _ONE_BY_ONE):
             continue
         before = promise.context[name]
         moves_with_home = extract.args.get("what") in _FROM_HOME and abs(now - before) <= HOME_M

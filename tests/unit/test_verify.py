@@ -164,13 +164,18 @@ def test_what_was_not_evaluated_or_is_another_mission_cannot_be_told() -> None:
     assert "3 waypoints" in found.sentence
 
 
-def asking(asked: float, before: float, what: str = "legs") -> Verification:
+def asking(
+    asked: float, before: float, what: str = "legs", kind: str = "mission_asked", *, lost: bool = False
+) -> Verification:
     """A run that recovered, of a mission whose legs, or way, were so many when the report was written."""
-    way = Variable(name=what, role=Role.CONTEXT, extract=Extract("mission_asked", {"what": what}))
+    way = Variable(name=what, role=Role.CONTEXT, extract=Extract(kind, {"what": what}))
     schema = replace(SCHEMA, variables={**SCHEMA.variables, what: way})
     run = planted_run(speed=5.0)
     run = replace(run, mission=replace(run.mission, asked=((what, asked),)))
-    return verify(replace(promise(), context={what: before}), triaged(run), schema)
+    said = replace(promise(), context={what: before})
+    if lost:
+        said = replace(said, objectives={**said.objectives, "success": Before(0.0, "fault", SUCCESS.threshold)})
+    return verify(said, triaged(run), schema)
 
 
 def test_another_mission_than_the_reports_proves_nothing() -> None:
@@ -180,6 +185,14 @@ def test_another_mission_than_the_reports_proves_nothing() -> None:
         "Cannot tell: this is another mission than that of the report: legs is 7, it was 5 there."
     )
     assert asking(5.0, before=5.0).verdict == "fixed_as_promised"
+
+
+def test_what_was_named_as_it_was_begun_is_more_of_the_same_mission_where_it_was_given_up() -> None:
+    """PX4 logs an item as it begins it, a ROS robot is sent goal by goal: of a lost mission not all are known."""
+    for kind in ("px4_mission_asked", "goals_asked"):
+        assert asking(7.0, before=5.0, kind=kind, lost=True).verdict == "fixed_as_promised"
+        assert asking(7.0, before=5.0, kind=kind).verdict == "cannot_tell"
+    assert asking(7.0, before=5.0, lost=True).verdict == "cannot_tell", "ArduPilot logs the mission whole"
 
 
 def test_a_vehicle_that_is_put_down_elsewhere_on_its_field_flies_the_same_mission() -> None:
