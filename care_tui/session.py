@@ -14,7 +14,7 @@ from care_core.diagnose.estimates import WORTH
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult
 from care_core.errors import CareError
 from care_core.records import Struct, field, replace
-from care_core.report.formats import FORMATS, Format
+from care_core.report.formats import FILE_FORMATS, Format
 from care_core.variables import Variable
 from care_tui.basket import Basket
 
@@ -49,8 +49,7 @@ class Session(Struct, eq=False):
     _options: list[Variable] | None = None
     _before_aside: dict[str, dict[str, float]] = field(default_factory=dict)
     """Options that left the fix when they were set aside, with what was ticked before."""
-    format: Format = FORMATS["html"]
-    """First what a colleague reads; programs ask for theirs by name."""
+    format: Format = FILE_FORMATS[0]
 
     @property
     def state(self) -> State:

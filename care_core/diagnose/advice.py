@@ -312,7 +312,7 @@ def _reference_meets(query: CounterfactualQuery) -> bool:
 def _named_by_run(failed: FailedRun, severity: Severity) -> tuple[str, Collection[str]]:
     """The first finding so severe that names options off their reference, by the profile's rules or by itself."""
     for finding in (one for one in failed.findings if one.severity == severity and set_wrong(one)):
-        said = (e.options for e in failed.run.evidence if e.text.startswith(f"{finding.title}:"))
+        said = (e.options for e in failed.run.evidence if e.text == finding.title)
         named = next(said, finding.parameters)
         if named and failed.off.issuperset(named):
             return finding.title, named

@@ -29,12 +29,12 @@ def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("formats", "name", "format", "shown"),
     [
-        ([], "00000042.care.html", "html", "text"),
-        (["f"], "00000042.care.json", "json", "json"),
-        (["f", "f"], "00000042.care.xml", "junit", "junit"),
-        (["f", "f", "f"], "00000042.care.patch", "patch", "patch"),
-        (["f", "f", "f", "f"], "00000042.care.yaml", "yaml", "yaml"),
-        (["f", "f", "f", "f", "f"], "00000042.care.md", "markdown", "markdown"),
+        ([], "00000042.care.yaml", "yaml", "yaml"),
+        (["f"], "00000042.care.md", "markdown", "markdown"),
+        (["f", "f"], "00000042.care.html", "html", "text"),
+        (["f", "f", "f"], "00000042.care.json", "json", "json"),
+        (["f", "f", "f", "f"], "00000042.care.xml", "junit", "junit"),
+        (["f", "f", "f", "f", "f"], "00000042.care.patch", "patch", "patch"),
     ],
 )
 async def test_export_writes_the_format_in_view_beside_the_operator(
@@ -63,7 +63,7 @@ async def test_a_file_whose_name_chose_another_format_is_what_is_shown(make_app:
 async def test_an_existing_file_is_replaced_only_when_asked_for(
     make_app: MakeApp, tmp_path: Path, answer: str, replaced: bool
 ) -> None:
-    target = tmp_path / "00000042.care.html"
+    target = tmp_path / "00000042.care.yaml"
     target.write_text("precious")
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
@@ -137,7 +137,7 @@ async def test_the_name_of_a_log_does_not_steer_the_terminal(make_app: MakeApp) 
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot, "6", "e")
         box = app.screen.query_one(Input)
-        assert box.value == "a\\x1b]52;c;aGk=\\x07b.care.html"
+        assert box.value == "a\\x1b]52;c;aGk=\\x07b.care.yaml"
         box.value = hostile
         await settle(pilot)
         drawn = "".join(segment.text for y in range(box.size.height) for segment in box.render_line(y))
@@ -149,9 +149,9 @@ async def test_what_was_decided_since_a_file_was_written_is_not_what_it_holds(ma
     app = make_app(sample.faulty())
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot, "6", "e", "enter", "4", "space", "6")
-        assert "not what 00000042.care.html holds" in title(app)
+        assert "not what 00000042.care.yaml holds" in title(app)
         await settle(pilot, "4", "space", "6")
-        assert "written to 00000042.care.html" in title(app)
+        assert "written to 00000042.care.yaml" in title(app)
 
 
 def test_the_text_of_a_page_is_shown_without_the_escapes_of_markdown() -> None:

@@ -63,7 +63,8 @@ def test_an_old_firmware_stamps_few_messages(tmp_path: Path) -> None:
     assert [str(value) for value in tables["ATT"]["Roll"]] == ["1.5", "nan"]
     assert tables["MSG"]["Message"].tolist() == ["one, two"]
     assert tables["MODE"]["Mode"].tolist() == ["Stabilize"]
-    assert {name: history[0].value for name, history in log.settings().items()} == {"RTL_ALT": 1500.0}
+    values = {name: str(history[0].value) for name, history in log.settings().items()}
+    assert values == {"BAD": "nan", "RTL_ALT": "1500.0"}
     assert log.facts == {"firmware": "ArduCopter V3.1", "vehicle": "multicopter"}
     assert log.start == "2014-01-26T15:44:16+00:00"
     assert (log.duration_s, log.damage) == (1.0, ())
