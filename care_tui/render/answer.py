@@ -43,7 +43,8 @@ def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool, 
         return [head, progress_bar(fraction, glyphs) + text(f"  {step}")]
     lines = [_head(session.diagnosis, glyphs, width), *_cause_and_change(session, glyphs, width, is_low=is_low)]
     next_step = verdict_of(session.diagnosis).next_step
-    if next_step and not is_low:
+    is_said = session.diagnosis.fix is not None and not session.diagnosis.abstained  # the change is what to do next
+    if next_step and not is_low and (is_tall or not is_said):
         lines.append(_labelled("Next") + text(next_step))
     return [*lines, *_limits(session.diagnosis, width, is_tall=is_tall)]
 

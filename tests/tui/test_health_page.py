@@ -72,7 +72,8 @@ async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         assert step_of(app) == 1
-        assert pinned(app)[-2].startswith("! Profile arducopter does not fit: it is a rover")
+        assert pinned(app)[-2].startswith("Next     check motor 2: ")
+        assert pinned(app)[-1].startswith("! Profile arducopter does not fit: it is a rover")
         assert "motor 2 lost thrust" in items(app)
         assert "- it is a rover, the profile is of a copter\n" in text(app)
         assert "What would make one fit\n- for arducopter: record CMD\n" in text(app)
@@ -142,13 +143,19 @@ async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_v
         await settle(pilot)
         for key in "123456yb":
             await settle(pilot, key)
-            fault, cause, change, fit, warnings = pinned(app)
+            fault, cause, change, limits = pinned(app)
             assert fault.startswith("✗ FAULT  mission_time 187.2 s")
             assert cause.startswith("Cause    █████████░  90 %  motor 2 lost thrust")
             assert "91 %  LAND_SPEED 16 → 50 cm/s" in change
-            assert fit.startswith("! Profile arducopter partly fits: the firmware is 4.3.6, ")
-            assert warnings.startswith("! 142 bytes that are no message")
+            assert limits.startswith("! Profile arducopter partly fits: the firmware is 4.3.6, ")
             assert all(len(line) <= 78 for line in pinned(app))
+    app = make_app(sample.crashed())
+    async with app.run_test(size=(80, 32)) as pilot:
+        await settle(pilot)
+        _, _, _, next_step, fit, warnings = pinned(app)
+        assert next_step.startswith("Next     make the change, ")
+        assert fit.startswith("! Profile arducopter partly fits: ")
+        assert warnings.startswith("! 142 bytes that are no message")
     app = make_app(replace(sample.all_ok(), profile=sample.fitting("fits")))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
