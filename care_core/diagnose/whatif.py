@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from operator import not_
 
+import numpy as np
+
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.configs.driven import option_value
 from care_core.diagnose.blame import blame
-from care_core.diagnose.fixes import as_likely, change_notes, prediction
+from care_core.diagnose.fixes import change_notes, prediction
 from care_core.diagnose.judging import Judged, query_of
 from care_core.diagnose.noisy_or import NoisyOr
 from care_core.diagnose.promise import Promise
@@ -77,16 +79,13 @@ class Question(Record, eq=False):
         """The prediction for this run with these options changed; option names must be the profile's."""
         query = self.query
         config = {**query.config, **changes}
-        then, now = map(float, self._odds([config, query.config]))
+        then, now = self._odds([config, query.config])
         outlooks = tuple(
-            Outlook(
-                result,
-                as_likely(prediction(query, name, config), then),
-                as_likely(prediction(query, name, query.config), now),
-            )
+            Outlook(result, prediction(query, name, config), prediction(query, name, query.config))
             for result in self.objectives
             if (name := result.variable.name) in query.model.outcomes
         )
+        least = min((one.predicted.p_ok for one in outlooks if one.predicted.p_ok is not None), default=1.0)
         return Answer(
             changes=tuple(
                 Change(
@@ -100,8 +99,8 @@ class Question(Record, eq=False):
                 for name, value in changes.items()
             ),
             outlooks=outlooks,
-            p_ok=then,
-            p_ok_now=now,
+            p_ok=min(float(then), least),
+            p_ok_now=float(now),
         )
 
     def over(self, name: str, beside: Mapping[str, float]) -> Iterator[tuple[float, Answer]]:
@@ -114,7 +113,10 @@ class Question(Record, eq=False):
         query, values = self.query, self._values_of(name)
         changes = [{**beside, name: value} for value in values]
         configs = [{**query.config, **change} for change in changes]
-        p_ok = self._odds(configs)
+        p_ok, together = self._odds(configs), query.probability(configs)
+        for result in self.objectives:
+            if result.name in query.model.outcomes:  # of one without a threshold it is not a number
+                p_ok = np.fmin(p_ok, np.maximum(query.p_ok(result.name, configs), together))
         in_support = [all(query.model.supports(*item) for item in change.items()) for change in changes]
         return tuple(Odds(*one) for one in zip(values, p_ok.tolist(), map(not_, in_support), strict=True))
 
