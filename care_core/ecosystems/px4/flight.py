@@ -23,6 +23,7 @@ from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
 from care_core.ecosystems.spans import Span, within
 from care_core.logs.base import Log, Table, Wanted
 from care_core.numbers import Bools
+from care_core.run import Setting
 
 STATUS, MESSAGES, LANDED = "vehicle_status", "logged_messages", "vehicle_land_detected"
 POSITION, RESULT, FLAGS = "vehicle_local_position", "mission_result", "failsafe_flags"
@@ -160,6 +161,12 @@ class Px4Flight(RunModel):
         """The value of a parameter as first driven, None where the log does not hold it."""
         value = next((one.value for one in self.log.settings().get(name, ())), None)
         return float(value) if isinstance(value, (int, float)) else None
+
+    def off_default(self, name: str) -> Setting | None:
+        """A parameter that was first driven off its airframe's default; None where it is at it, or the log lacks
+        either."""
+        setting = next(iter(self.log.settings().get(name, ())), None)
+        return None if setting is None or setting.default in (None, setting.value) else setting
 
     def killed_s(self, span: Span = (-math.inf, math.inf)) -> float | None:
         """When the kill switch first cut its motors in a span, None where it did not."""

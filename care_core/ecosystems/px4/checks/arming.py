@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from care_core.configs.driven import same_value
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.flight import MESSAGES, STATUS, Px4Flight, is_bare_denial, reason_of
 from care_core.ecosystems.px4.preflight import read_by
 from care_core.ecosystems.timeline import counted
 from care_core.logs.base import Wanted
-from care_core.run import Setting, shown
+from care_core.run import shown
 
 READS: Wanted = {STATUS: ("arming_state",), MESSAGES: ("message",)}
 LIMITS = Limits()
@@ -28,7 +27,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         return
     reasons = list(dict.fromkeys(reason_of(text) for _, text in flight.refusals))
     first, last = flight.complaints[0][0], flight.complaints[-1][0]
-    off = {name: setting for reason in reasons for name in read_by(reason) if (setting := _off(name, flight))}
+    off = {name: setting for reason in reasons for name in read_by(reason) if (setting := flight.off_default(name))}
     others = "".join(f"{text}; " for text in reasons[-3:-1])
     values = "".join(f"; {one.name} is {shown(one.value)} (default {shown(one.default)})" for one in off.values())
     named = tuple(dict.fromkeys((*off, *(n for reason in reasons for n in read_by(reason) if n in _PLANNED_BY))))
@@ -47,14 +46,6 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         probability=_UNSAID if is_unsaid else _SURE,
         mission_lost=_KEPT,
     )
-
-
-def _off(name: str, flight: Px4Flight) -> Setting | None:
-    """A parameter that is not at its airframe's default; None where it is, or the log does not hold both."""
-    setting = next(iter(flight.log.settings().get(name, ())), None)
-    if setting is None or setting.default is None or same_value(setting.default, setting.value):
-        return None
-    return setting
 
 
 CHECK = Check("arming", "preflight checks that kept it from arming", READS, LIMITS, find)

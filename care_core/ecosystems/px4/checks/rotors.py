@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from care_core.configs.driven import same_value
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.flight import Px4Flight
@@ -46,7 +45,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     if all(len(values) == count for values in rotors.values()):
         wrong = dict(_unbalanced(rotors))
         names = [f"CA_ROTOR{n}_{field}" for fields in wrong.values() for field in fields for n in range(count)]
-        if off := _off(names, settings):
+        if off := _off(names, flight):
             yield _found(flight, "the rotors that it is told of do not balance", listed(list(wrong)), off)
     yield from _undriven(flight, settings, count)
 
@@ -78,7 +77,7 @@ def _undriven(flight: Px4Flight, settings: Mapping[str, tuple[Setting, ...]], co
     missing = [n for n in range(count) if n not in driven]
     if not missing or len(missing) == count:
         return
-    off = _off(list(functions), settings)
+    off = _off(list(functions), flight)
     taken = {name: one for name, one in off.items() if one.default in [_FIRST_MOTOR + n for n in missing]}
     if taken:
         motors = listed([f"motor {n + 1}" for n in missing])
@@ -87,10 +86,9 @@ def _undriven(flight: Px4Flight, settings: Mapping[str, tuple[Setting, ...]], co
         )
 
 
-def _off(names: Sequence[str], settings: Mapping[str, tuple[Setting, ...]]) -> dict[str, Setting]:
+def _off(names: Sequence[str], flight: Px4Flight) -> dict[str, Setting]:
     """The parameters that are not at their airframe's defaults, as far as the log holds these."""
-    first = {name: settings[name][0] for name in names if settings.get(name)}
-    return {n: one for n, one in first.items() if one.default is not None and not same_value(one.default, one.value)}
+    return {name: one for name in names if (one := flight.off_default(name)) is not None}
 
 
 def _found(flight: Px4Flight, title: str, evidence: str, off: Mapping[str, Setting]) -> Finding:
