@@ -95,8 +95,7 @@ def test_from_start_to_the_exported_report(tmp_path: Path, sample: str) -> None:
     terminal.press("\r", "LAND_SPEED")  # its causes
     terminal.press("\r", "What to change")  # the fix
     terminal.press("\r", "+++ suggested")  # the diff
-    terminal.press("\r", "Report as")  # as a page first
-    terminal.press("ffff", "care.triage/1")  # the report for programs
+    terminal.press("\r", "care.triage/1")  # the report
     terminal.press("\r", "Write the report to")
     terminal.press("\r", "written to")
     terminal.child.send("q")

@@ -108,7 +108,8 @@ def test_the_app_pins_the_next_step_and_the_worse_mission_and_one_line_of_limits
         return [line.plain for line in lines]
 
     usual = pinned(is_low=False, is_tall=False)
-    assert any(line.startswith("Next     make the change") for line in usual)
+    assert not any(line.startswith("Next") for line in usual)  # the change says it
+    assert any(line.startswith("Next     make the change") for line in pinned(is_low=False, is_tall=True))
     (limits,) = (line for line in usual if line.startswith("! "))
     assert limits.startswith(f"! FAULT in mission {own.index + 1} of this log, too (t); Profile arducopter partly fits")
     tall = [line for line in pinned(is_low=False, is_tall=True) if line.startswith("! ")]
