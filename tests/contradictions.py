@@ -316,7 +316,8 @@ def _(report: Report) -> bool:
 @_named("flown again as it was after it was upset")
 def _(report: Report) -> bool:
     upset = any(kind in _UPSET and severity == "critical" for kind, severity, _ in _titles(report))
-    return upset and any("run again" in text or "run the same" in text for text in _next(report))
+    as_it_was = (text.removesuffix("then run again") for text in _next(report))  # a simulation, once it is put right
+    return upset and any("run again" in text or "run the same" in text for text in as_it_was)
 
 
 def _next(report: Report) -> Iterator[str]:
