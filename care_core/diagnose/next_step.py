@@ -19,8 +19,9 @@ from care_core.ecosystems.findings import (
     every_finding,
 )
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
-from care_core.ecosystems.vehicles import flies, is_simulated, vehicle_of
+from care_core.ecosystems.vehicles import flies, is_simulated, vehicle_of, vehicle_of_run
 from care_core.logs.formats import MAVLINK_TLOG, format_named
+from care_core.metadata.causal_map import meaning_of
 from care_core.run import Run, shown
 from care_core.text import listed
 
@@ -192,11 +193,19 @@ def _undone(diagnosis: Diagnosis) -> str:
     if named is not None and _is_kept(named.name, diagnosis):
         return f"let {named.name} change as well: without it nothing is likely enough"
     said = None if named is None else next((one for one in findings if _says(one, named.name)), None)
+    if named is not None and _protects(named.name, run):
+        return _looked_at(named.name, diagnosis)
     if named is not None and said is not None:
         return _put_right(_put_back_with(named.name, said, findings), findings, run)
     if named is not None and named.name not in diagnosis.run.config:
         return _looked_at(named.name, diagnosis)
     return ""
+
+
+def _protects(name: str, run: Run) -> bool:
+    """Whether a parameter is a protection: nobody is told to make one looser."""
+    meaning = meaning_of(name, vehicle_of_run(run).kind)
+    return meaning is not None and meaning.role == "safety"
 
 
 def _put_right(names: Sequence[str], findings: Iterable[Finding], run: Run) -> str:

@@ -225,14 +225,20 @@ def test_what_can_be_put_right_at_once_comes_first() -> None:
     assert said == "put SERVO2_FUNCTION back as the findings say, then try it in the simulator or a low hover"
 
 
-def test_the_value_that_a_finding_wants_is_told_with_its_command() -> None:
-    name = "TKOFF_RPM_MIN"
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("FRAME_TYPE", "set FRAME_TYPE to 0 ('param set FRAME_TYPE 0'), then try it"),
+        ("TKOFF_RPM_MIN", "check whether TKOFF_RPM_MIN is right for this vehicle, then try it"),  # it protects
+    ],
+)
+def test_the_value_that_a_finding_wants_is_told_with_its_command_but_of_a_protection(name: str, says: str) -> None:
     kept = Finding(
         "takeoff", "the motors were kept from spooling up", 30.5, 35.0, "critical", "", "", "parameter", 0.9,
         parameters=(name,), wanted=((name, 0.0),),
     )  # fmt: skip
     told = replace(failed(kept), hypotheses=(Hypothesis("parameter", name, 0.96),))
-    assert next_step(told, has_failed=True).startswith(f"set {name} to 0 ('param set {name} 0'), then try it")
+    assert next_step(told, has_failed=True).startswith(says)
 
 
 def test_of_two_motors_that_were_switched_off_both_are_switched_on() -> None:

@@ -69,11 +69,23 @@ def test_a_check_that_refuses_names_what_it_reads_where_that_is_off() -> None:
     tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
     off = {"COM_PARACHUTE": (Setting("COM_PARACHUTE", 1.0, "ulog", 0.0),)}
     (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=off)))
-    assert (found.parameters, found.wanted) == (("COM_PARACHUTE",), (("COM_PARACHUTE", 0.0),))
-    assert "COM_PARACHUTE is 1 (default 0)" in found.evidence
+    assert (found.parameters, found.wanted) == (("COM_PARACHUTE",), ())  # a protection is not made looser
+    assert found.evidence.endswith("COM_PARACHUTE is 1 (default 0): check it first")
     as_shipped = {"COM_PARACHUTE": (Setting("COM_PARACHUTE", 1.0, "ulog", 1.0),)}
     (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=as_shipped)))
     assert (found.parameters, found.suspect) == ((), "operation")
+
+
+def test_what_is_wired_is_put_back_where_a_check_refuses_for_it() -> None:
+    said = words(
+        (5.0, "critical", "Preflight Fail: Found 1 compass (required: 4)"),
+        (6.0, "critical", "Arming denied: Resolve system health failures first"),
+    )
+    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
+    off = {"SYS_HAS_MAG": (Setting("SYS_HAS_MAG", 4.0, "ulog", 1.0),)}
+    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=off)))
+    assert found.wanted == (("SYS_HAS_MAG", 1.0),)
+    assert found.evidence.endswith("SYS_HAS_MAG is 4 (default 1): 'param set SYS_HAS_MAG 1' puts it back")
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from care_core.ecosystems.ardupilot.checks.settings.supply import wrong_scale
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.texts import Refusal
 from care_core.ecosystems.base import Limits
+from care_core.ecosystems.way_back import SET_BY_HAND, way_back
 from care_core.metadata.ardupilot import firmware_default
 from care_core.metadata.causal_map import Role, meaning_of
 from care_core.metadata.refusals import Must, refusal_reads
@@ -180,12 +181,7 @@ def _told(
     """`only`: the one value that its check takes."""
     default = "" if one.default is None else f" (default {one.default:g})"
     told = f"{one.name} is {one.value:g}{default}{f', {asks}' if asks else ''}"
-    is_set_by_hand = one.role in ("choice", "wiring")
-    wanted = one.default if one.is_off and is_set_by_hand else None
-    if only is not None and is_set_by_hand:
-        wanted, back = only, f"'param set {one.name} {only:g}' sets it"
-    elif wanted is not None:
-        back = f"'param set {one.name} {wanted:g}' puts it back"
-    else:
-        back = "calibrate again" if one.role in ("calibration", "written") else "check it first"
+    asked = only if only is not None else one.default if one.is_off else None
+    wanted = asked if one.role in SET_BY_HAND else None
+    back = way_back(one.name, one.role, wanted, "puts it back" if only is None else "sets it")
     return Refusing(one.name, f"{told}: {back}", wanted, probability, is_shown)

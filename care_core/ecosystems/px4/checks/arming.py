@@ -9,8 +9,11 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.flight import MESSAGES, STATUS, Px4Flight, is_bare_denial, reason_of
 from care_core.ecosystems.px4.preflight import read_by
 from care_core.ecosystems.timeline import counted
+from care_core.ecosystems.way_back import SET_BY_HAND, way_back
 from care_core.logs.base import Wanted
-from care_core.run import shown
+from care_core.metadata.causal_map import meaning_of
+from care_core.metadata.firmware import PX4
+from care_core.run import Setting, shown
 
 READS: Wanted = {STATUS: ("arming_state",), MESSAGES: ("message",)}
 LIMITS = Limits()
@@ -29,7 +32,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     first, last = flight.complaints[0][0], flight.complaints[-1][0]
     off = {name: setting for reason in reasons for name in read_by(reason) if (setting := flight.off_default(name))}
     others = "".join(f"{text}; " for text in reasons[-3:-1])
-    values = "".join(f"; {one.name} is {shown(one.value)} (default {shown(one.default)})" for one in off.values())
+    asked = {name: _asked(one) for name, one in off.items()}
+    values = "".join(f"; {_told(one, asked[name])}" for name, one in off.items())
     named = tuple(dict.fromkeys((*off, *(n for reason in reasons for n in read_by(reason) if n in _PLANNED_BY))))
     is_unsaid = all(is_bare_denial(reason) for reason in reasons)
     yield Finding(
@@ -42,10 +46,23 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         source=f"{MESSAGES} of the preflight checks",
         suspect="parameter" if named or is_unsaid else "operation",
         parameters=named,
-        wanted=tuple((name, float(one.default)) for name, one in off.items() if isinstance(one.default, (int, float))),
+        wanted=tuple((name, value) for name, value in asked.items() if value is not None),
         probability=_UNSAID if is_unsaid else _SURE,
         mission_lost=_KEPT,
     )
+
+
+def _asked(one: Setting) -> float | None:
+    """The default to put it back to; None for what protects, and for a calibration."""
+    meaning = meaning_of(one.name, PX4)
+    is_set_by_hand = meaning is not None and meaning.role in SET_BY_HAND
+    return float(one.default) if is_set_by_hand and isinstance(one.default, (int, float)) else None
+
+
+def _told(one: Setting, asked: float | None) -> str:
+    meaning = meaning_of(one.name, PX4)
+    back = way_back(one.name, None if meaning is None else meaning.role, asked)
+    return f"{one.name} is {shown(one.value)} (default {shown(one.default)}): {back}"
 
 
 CHECK = Check("arming", "preflight checks that kept it from arming", READS, LIMITS, find)

@@ -1,0 +1,15 @@
+"""How a parameter that keeps a vehicle from arming is put right, by who sets it and for what."""
+
+from __future__ import annotations
+
+from care_core.metadata.causal_map import Role
+
+SET_BY_HAND: frozenset[Role] = frozenset(("choice", "wiring"))
+"""Roles of what is put back by a command: what protects is looked at first, and a calibration is made again."""
+
+
+def way_back(name: str, role: Role | None, wanted: float | None, does: str = "puts it back") -> str:
+    """The way back in words; with the command where a value is wanted."""
+    if wanted is not None:
+        return f"'param set {name} {wanted:g}' {does}"
+    return "calibrate again" if role in ("calibration", "written") else "check it first"
