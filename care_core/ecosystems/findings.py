@@ -145,6 +145,8 @@ STOPPED = "the emergency switch stopped the motors in the air"
 UNDRIVEN = "the firmware found a crash while its motors were at rest"
 UNPOWERED = "the motors draw no power"
 NOT_BEGUN = "its mission never began"
+NOT_READY = "not ready to fly: "
+"""Begins the title of a refusal of PX4; the words of its last check follow."""
 NO_BATTERY = "the battery monitor measures no battery, and its failsafe acted"
 CAME_DOWN = "it came down and could not rise again"
 

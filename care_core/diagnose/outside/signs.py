@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import columns
 from care_core.diagnose.records import ObjectiveResult
-from care_core.ecosystems.findings import Event, Finding, FindingKind, Health, every_finding
+from care_core.ecosystems.findings import NOT_READY, Event, Finding, FindingKind, Health, every_finding
 from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.metadata.causal_map import Sign
 from care_core.metadata.screening import plain_refusal
@@ -60,8 +60,6 @@ _SHARE = 0.3
 
 _EXPLAINS = re.compile(r"[A-Z][A-Z0-9]*_[A-Z0-9_]+ is -?\d")
 """What the evidence of a refusal adds of the parameters that its check reads."""
-_LAST = re.compile(r"not ready to fly: (.+)")
-"""The title of PX4's refusals."""
 
 
 class Signs(Record):
@@ -108,8 +106,8 @@ def _refusals(findings: Iterable[Finding]) -> frozenset[str]:
 
 def _said(refusal: Finding) -> Iterator[str]:
     """The words of the checks that refused: of PX4, which complains of much until it is ready, the last ones."""
-    if last := _LAST.match(refusal.title):
-        yield last[1]
+    if refusal.title.startswith(NOT_READY):
+        yield refusal.title.removeprefix(NOT_READY)
     else:
         yield from (text for text in refusal.evidence.split("; ") if not _EXPLAINS.match(text))
 

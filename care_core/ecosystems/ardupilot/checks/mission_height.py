@@ -6,6 +6,7 @@ the mission is flown far above the site, and what lands, or waits for its height
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,7 +19,6 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during
 from care_core.ecosystems.vehicles import flies, way_of
 from care_core.logs.base import Wanted
-from care_core.numbers import Floats
 from care_core.run import shown
 
 READS: Wanted = {}
@@ -44,14 +44,14 @@ def find(flight: Flight) -> Iterator[Finding]:
     t, height = known
     for mission, until_s in _flown(flight):
         highest = _highest_m(mission, flight)
-        if highest is None:
-            continue
-        limit = highest + max(_ABOVE_M, _TIMES * highest)
+        above = height > (math.inf if highest is None else highest + max(_ABOVE_M, _TIMES * highest))
+        if highest is None or not above.any():
+            continue  # nearly every flight: nothing else is looked at
         by_itself = np.array([way_of(flight.mode_kind, int(mode)) == "mission" for mode in flight.modes_at(t)])
         held = (t >= mission.since_s) & (t < until_s) & during(flight.airborne, t)
-        spans = lasting(t, (height > limit) & by_itself & held, _LASTS_S)
-        if spans:
-            yield _found(flight, spans[0][0], spans[-1][1], _within(t, height, spans[0][0], spans[-1][1]), highest)
+        if spans := lasting(t, above & by_itself & held, _LASTS_S):
+            start, end = spans[0][0], spans[-1][1]
+            yield _found(flight, start, end, float(np.max(height[(t >= start) & (t <= end)])), highest)
             return
 
 
@@ -71,10 +71,6 @@ def _highest_m(mission: HeldMission, flight: Flight) -> float | None:
     if not any(one.command == RETURN for one in mission.items.values()):
         return highest
     return max(highest, (flight.setting(*_RETURN_CM) or 0.0) / 100, flight.setting(*_RETURN_M) or 0.0)
-
-
-def _within(t: Floats, height: Floats, start: float, end: float) -> float:
-    return float(np.max(height[(t >= start) & (t <= end)]))
 
 
 def _found(flight: Flight, start: float, end: float, reached_m: float, highest_m: float) -> Finding:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import NOT_READY, Finding
 from care_core.ecosystems.px4.flight import MESSAGES, STATUS, Px4Flight, is_bare_denial, reason_of
 from care_core.ecosystems.px4.preflight import read_by
 from care_core.ecosystems.timeline import counted
@@ -38,7 +38,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     is_unsaid = all(is_bare_denial(reason) for reason in reasons)
     yield Finding(
         kind="prearm",
-        title=f"not ready to fly: {reasons[-1]}",
+        title=f"{NOT_READY}{reasons[-1]}",
         onset_s=first,
         end_s=max(last, first),
         severity="critical" if flight.was_denied else "warning",
