@@ -26,6 +26,7 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_a_new_robot_from_its_logs_to_a_diagnosis(care: Care, logs: Path, tmp_path: Path) -> None:
     robot, table = tmp_path / "courier", tmp_path / "courier.csv"
     made = care("profiles", "new", logs, "--out", robot)

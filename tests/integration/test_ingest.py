@@ -63,6 +63,7 @@ def stop_in_the_middle(process: subprocess.Popen[str], journal: Path, how: signa
     return process.communicate(timeout=30)[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".csv", pytest.param(".parquet", marks=pytest.mark.long)])
 def test_killed_and_interrupted_it_ends_with_the_same_table(logs: Path, suffix: str, care: Care) -> None:
     if suffix == ".parquet":

@@ -70,6 +70,7 @@ def test_an_ingest_that_is_killed_is_resumed(care: Care, tmp_path: Path) -> None
     assert not list(tmp_path.glob(".runs*"))
 
 
+@pytest.mark.long
 def test_a_campaign_that_is_killed_is_resumed(tmp_path: Path) -> None:
     runs = KILLS // TARGETS + 3
     path = campaign_in(tmp_path, command="sh -c 'sleep 0.05; cp drive.bag \"$CARE_LOGS\"'", runs=runs, slots=2)

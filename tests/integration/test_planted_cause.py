@@ -340,6 +340,7 @@ def test_options_that_no_source_holds_are_assumed_and_said_so(planted: Profile) 
     assert diagnosis.faults[0].causes[0].option.name == "reserve"
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_files_and_the_same_diagnosis(tmp_path: Path) -> None:
     first, again = tmp_path / "first", tmp_path / "again"
     for folder in (first, again):

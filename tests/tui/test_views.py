@@ -49,6 +49,7 @@ def real(configs: tuple[str | Path, ...] = ()) -> CareApp:
     return CareApp(replace(REQUEST, configs=configs), engine=engine, settings=Settings(places=()))
 
 
+@pytest.mark.long
 @needs_sample
 async def test_every_view_opens_shows_the_run_and_closes() -> None:
     app = real()
