@@ -9,7 +9,7 @@ import numpy as np
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.diagnose.records import Fix, Prediction
-from care_core.numbers import Bools
+from care_core.numbers import Bools, Floats
 from care_core.records import replace
 from care_core.variables import Change, Role, Variable
 
@@ -33,7 +33,8 @@ Assignment = Mapping[str, float]
 
 
 def candidate_values(query: CounterfactualQuery, name: str) -> tuple[float, ...]:
-    """Acceptable values inside the training support, from the reference towards the run's value.
+    """Acceptable values inside the training support, from the reference towards the run's value: those between are of
+    two digits, which is what somebody would set.
 
     An option marked `safety` is only moved towards its default, never past it, so no value here is looser; codes have
     no order, so of a safety option's codes only the default is left.
@@ -45,11 +46,17 @@ def candidate_values(query: CounterfactualQuery, name: str) -> tuple[float, ...]
     elif variable.type == "bool":
         steps = (0.0, 1.0)
     elif variable.is_log_scaled and current > 0 and reference > 0:
-        steps = np.geomspace(reference, current, STEPS + 1)[:-1]
+        steps = _between(reference, current, np.geomspace(reference, current, STEPS + 1))
     else:
-        steps = np.linspace(reference, current, STEPS + 1)[:-1]
+        steps = _between(reference, current, np.linspace(reference, current, STEPS + 1))
     snapped = dict.fromkeys(variable.snap(float(step)) for step in steps)
     return tuple(v for v in snapped if v != current and variable.accepts(v) and query.model.supports(name, v))
+
+
+def _between(reference: float, current: float, steps: Floats) -> list[float]:
+    """The reference, and the steps from it towards the run's value, rounded but neither past the one nor the other."""
+    low, high = sorted((reference, current))
+    return [reference, *(min(max(float(f"{step:.2g}"), low), high) for step in steps[1:-1])]
 
 
 def search(query: CounterfactualQuery, candidates: Collection[str]) -> list[tuple[Assignment, float]]:

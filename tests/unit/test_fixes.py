@@ -74,7 +74,7 @@ def test_the_reference_comes_first(planted: Profile, name: str, current: float, 
 
 def test_a_ratio_is_walked_in_ratios(planted: Profile) -> None:
     gain = Variable("gain", Role.OPTION, range=(0.01, 10.0), default=0.1)
-    assert candidates(planted, gain, 10.0, 0.1) == (0.1, 0.2512, 0.631, 1.585, 3.981)
+    assert candidates(planted, gain, 10.0, 0.1) == (0.1, 0.25, 0.63, 1.6, 4.0)
 
 
 def test_one_planted_cause_needs_one_change(planted: Profile) -> None:
