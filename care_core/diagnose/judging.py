@@ -136,7 +136,7 @@ def verdict(judged: Judged, findings: Sequence[Finding] = ()) -> MissionVerdict:
         return MissionVerdict(judged.run.mission, "fault", "; ".join(broken), everything)
     unknown = [result for result in everything if result.status == "not_evaluated"]
     if not judged.results and not unknown:
-        return MissionVerdict(judged.run.mission, "not_evaluated", "nothing that could be judged failed", everything)
+        return MissionVerdict(judged.run.mission, "not_evaluated", "what could be judged is OK", everything)
     reason = unknown[0].reason if unknown else ""
     return MissionVerdict(judged.run.mission, "not_evaluated" if unknown else "ok", reason, everything)
 

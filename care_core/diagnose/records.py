@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Literal
 
 from care_core.diagnose.noisy_or import UNKNOWN, NoisyOr, What
@@ -266,6 +266,17 @@ class Hypothesis(Record):
     probability: float
     acts: float = 0.0
     """Probability that it acted, whatever else did: causes are not exclusive."""
+
+
+UNLIKELY = 0.05
+"""A parameter that acted with less than this is named, and no more: its paths would hide those that may matter."""
+
+
+def told_in_full(option: str, hypotheses: Collection[Hypothesis], changed: Collection[str]) -> bool:
+    """Whether more is told of a cause than its name: it may well have acted, or is to be changed, or nothing weighs the
+    causes."""
+    acts = {one.name: one.acts for one in hypotheses if one.what == "parameter"}
+    return not hypotheses or option in changed or acts.get(option, 0.0) >= UNLIKELY
 
 
 def first_named(hypotheses: Iterable[Hypothesis]) -> Hypothesis | None:

@@ -346,7 +346,7 @@ def _failed(
         return f"{reason}{'; ' if reason else ''}{names} could not be evaluated, no fault was found"
     if status == "not_evaluated" and fit == "no":
         met = listed([one.name for one in objectives if one.status == "ok"])
-        return f"nothing that could be judged failed ({met})"
+        return f"{met} are OK; no profile fits, so nothing else was judged"
     if status == "not_evaluated":
         return "nothing could be judged"
     part = next(filter(_is_broken_part, findings), None)

@@ -27,6 +27,7 @@ from care_core.diagnose.records import (
     Since,
     Status,
     outcome,
+    told_in_full,
 )
 from care_core.diagnose.verdict import (
     Advice,
@@ -345,6 +346,13 @@ class Report(TriageDocument, kw_only=True):
     verdict: Verdict
     diff: str
     apply: list[str]
+
+    def told(self, fault: FaultEntry) -> tuple[list[CauseEntry], list[str]]:
+        """The causes of which all is told, and the names of the others."""
+        fixes = (self.fix, *self.fix.alternatives) if self.fix else ()
+        changed = {change.option for fix in fixes for change in fix.changes}
+        shown = [cause for cause in fault.causes if told_in_full(cause.option, self.hypotheses, changed)]
+        return shown, [cause.option for cause in fault.causes if cause not in shown]
 
 
 def build_document(diagnosis: Diagnosis) -> Report:

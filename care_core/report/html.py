@@ -13,14 +13,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from care_core.diagnose.verdict import STATUS_WORDS
-from care_core.records import Record
+from care_core.records import Record, replace
 from care_core.report.comparison import CompareDocument, head_of, sections_of
 from care_core.report.document import FaultEntry, FixEntry, Report
 from care_core.report.path_drawing import MOST, paths_svg
 from care_core.report.plots import NOTHING_DRAWN, Drawing, Plot, plot_figure
 from care_core.report.responses import Response, response_figure
 from care_core.report.shared_causes import together
-from care_core.report.wording import SEVERITY_WORDS, noted
+from care_core.report.wording import SEVERITY_WORDS, below, noted
 from care_core.run import shown
 from care_core.text import clean, listed, log_time, percent
 
@@ -93,7 +93,7 @@ def _parts(report: Report, drawing: Drawing) -> Iterator[Part]:
     groups = together(report.faults, lambda fault: [cause.path for cause in fault.causes])
     for number, faults in enumerate(groups, start=1):
         names = listed([str(_CODE.format(one.objective)) for one in faults])
-        content = _causes(faults[-1], drawing, f"paths{number}")
+        content = _causes(report, faults[-1], drawing, f"paths{number}")
         yield Part(f"causes{number}", Markup(f"Causes of {names}"), "causes", content)
     yield Part("fix", "Fix", "fix", report.fix and _fix(report, report.fix, drawing))
     yield Part("signals", "Signals", "signals", drawing if drawing.plots else None)
@@ -124,10 +124,13 @@ def _facts(report: Report) -> list[tuple[str, str]]:
     ]
 
 
-def _causes(fault: FaultEntry, drawing: Drawing, name: str) -> dict[str, Any]:
+def _causes(report: Report, fault: FaultEntry, drawing: Drawing, name: str) -> dict[str, Any]:
+    causes, unlikely = report.told(fault)
     judged = next((one for one in drawing.faults if one.objective.name == fault.objective), None)
-    paths = Markup("\n".join(paths_svg(judged, name))) if judged and fault.causes else ""
-    return {"causes": fault.causes, "paths": paths, "drawn": min(MOST, len(fault.causes))}
+    drawn = [one for one in judged.causes if one.option.name not in unlikely][:MOST] if judged else []
+    paths = Markup("\n".join(paths_svg(replace(judged, causes=tuple(drawn)), name))) if judged and drawn else ""
+    others = below(unlikely, after=len(causes)) if unlikely else ""
+    return {"causes": causes, "others": others, "paths": paths, "drawn": len(drawn)}
 
 
 def _fix(report: Report, fix: FixEntry, drawing: Drawing) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from care_core.report.document import (
 )
 from care_core.report.health import finding_sentence
 from care_core.report.shared_causes import together
-from care_core.report.wording import SEVERITY_WORDS, noted
+from care_core.report.wording import SEVERITY_WORDS, below, noted
 from care_core.run import shown
 from care_core.text import listed, log_time
 
@@ -58,7 +58,7 @@ def _sections(report: Report) -> Iterator[Iterable[str]]:
     yield _listed("Findings, the first cause first", told)
     yield _objectives(report.objectives)
     for faults in together(report.faults, lambda fault: [cause.path for cause in fault.causes]):
-        yield _causes([one.objective for one in faults], faults[-1].causes, report.odds_as_driven)
+        yield _causes([one.objective for one in faults], *report.told(faults[-1]), report.odds_as_driven)
     if report.fix is not None:
         yield _fix(report, report.fix)
     if report.since is not None:
@@ -94,9 +94,11 @@ def _objective(one: ObjectiveEntry) -> str:
     return "".join(parts)
 
 
-def _causes(names: list[str], causes: Iterable[CauseEntry], as_driven: float | None) -> Iterator[str]:
+def _causes(names: list[str], causes: list[CauseEntry], unlikely: list[str], as_driven: float | None) -> Iterator[str]:
     yield from ("", f"## Causes of {listed([f'`{name}`' for name in names])}", "")
     lines = [line for cause in causes for line in _cause(cause, as_driven)]
+    if unlikely:
+        lines += [*([""] if lines else []), below([f"`{name}`" for name in unlikely], after=len(causes))]
     yield from lines or ["None is likely among the parameters of the profile."]
 
 

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
-from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode, told_in_full
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
 from care_core.report.health import EVENTS_SHOWN, account_lines, finding_lines, reason_lines, telling
 from care_core.report.shared_causes import together
+from care_core.report.wording import below
 from care_core.run import Evidence, Value, gathered, is_known, place_of_damage
-from care_core.text import but_for_numbers, listed, log_time, log_times, percent, wrapped
+from care_core.text import but_for_numbers, listed, log_time, log_times, wrapped
 from care_core.variables import Variable
 
 EVIDENCE_SHOWN = 5
@@ -22,8 +23,6 @@ BEGINNING = 60
 """Letters by which a message is known again: what happened shortens it."""
 _HOW_OFTEN = re.compile(r" \(\d+ times\)$")
 DAMAGE_SHOWN = 5
-UNLIKELY = 0.05
-"""Probability that a cause acted below which it has its name alone: its paths would hide those that may matter."""
 CHANGES_SHOWN = 20
 """Of parameters that are no options of the profile; the options are all shown."""
 
@@ -127,20 +126,15 @@ def _causes(faults: Sequence[Fault], diagnosis: Diagnosis) -> Iterator[str]:
     for cause in shown:
         yield from _cause(cause, diagnosis.odds_as_driven)
     if unlikely := [cause.option.name for cause in named if cause not in shown]:
-        yield from wrapped(
-            f"{'others ' if shown else ''}below {percent(UNLIKELY)}: {', '.join(unlikely)}", "  ", "    "
-        )
+        yield from wrapped(below(unlikely, after=len(shown)), "  ", "    ")
     leads = [f"{c.option.name} ({c.option.driven(c.current, c.is_assumed)})" for c in fault.causes if c.is_lead]
     if leads:
         yield from wrapped(f"not ruled out: {', '.join(leads)}", "  ", "    ")
 
 
 def _is_unlikely(cause: Cause, diagnosis: Diagnosis) -> bool:
-    """Whether a cause hardly acted and nothing is to be changed of it; where nothing weighs the causes, none is."""
     changed = {change.option.name for fix in (diagnosis.fix, *diagnosis.alternatives) if fix for change in fix.changes}
-    acts = {one.name: one.acts for one in diagnosis.hypotheses if one.what == "parameter"}
-    is_weighed = bool(diagnosis.hypotheses)
-    return is_weighed and cause.option.name not in changed and acts.get(cause.option.name, 0.0) < UNLIKELY
+    return not told_in_full(cause.option.name, diagnosis.hypotheses, changed)
 
 
 def _cause(cause: Cause, as_driven: float | None) -> Iterator[str]:
