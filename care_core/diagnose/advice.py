@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from care_core.causal.counterfactual import CounterfactualQuery
+from care_core.diagnose.blame import Blame
 from care_core.diagnose.causes import MIN_CONTRIBUTION
 from care_core.diagnose.circumstances import battery_is_low
 from care_core.diagnose.estimates import NECESSARY, WORTH
@@ -26,15 +27,26 @@ from care_core.diagnose.outside.change import (
     Advisable,
     asked_by_refusals,
     check_first,
+    leading_outside,
     outside_fix,
     refused_beside,
 )
-from care_core.diagnose.parts import mend_first, set_wrong, was_refused
+from care_core.diagnose.parts import mend_first, set_wrong, unmended, was_refused
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Fault, Fix, Hypothesis
 from care_core.diagnose.tell_more import AllBack
-from care_core.diagnose.worth import falls_short, is_worth, nearest, no_stand_out, promised, unrecorded, untried
+from care_core.diagnose.worth import (
+    LOOK_FIRST,
+    falls_short,
+    is_worth,
+    nearest,
+    no_stand_out,
+    outweighed,
+    promised,
+    unrecorded,
+    untried,
+)
 from care_core.ecosystems.findings import Finding, Severity, every_finding
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
@@ -56,18 +68,61 @@ class Advised(Record):
     fixes: Sequence[Fix]
     abstained: str | None
     why: str = ""
+    lead: Advisable | None = None
+    """The parameter outside the profile of which it is, None where options of the profile were searched."""
+    is_part_first: bool = False
+    """Whether a part comes before any change."""
+
+    @property
+    def fix(self) -> Fix | None:
+        """The advised one."""
+        return None if self.abstained else self.fixes[0]
+
+    @property
+    def alternatives(self) -> tuple[Fix, ...]:
+        """What else may be changed instead."""
+        return () if self.abstained else tuple(self.fixes[1:])
+
+
+def advise(
+    failed: FailedRun,
+    judged: Judged,
+    faults: tuple[Fault, ...],
+    blamed: Blame,
+    hypotheses: Sequence[Hypothesis],
+    promise: Promise,
+    unheard: str | None,
+) -> Advised:
+    """What is advised of a failed run: what leads the ranking decides whether it is of a parameter outside the profile,
+    of a part or of the options.
+
+    Args:
+        unheard: why training says nothing of this failure, None where it does.
+    """
+    part = part_first(failed, failed.findings)
+    lead = leading_outside(hypotheses, blamed.outside, failed.findings, failed.run)
+    if lead is not None and (part is None or lead.is_found):
+        advised = of_outside(lead, failed, hypotheses, promise)
+    else:
+        failed_part = part and unmended(part, likelier_than(part, hypotheses, failed))
+        against = failed_part or outweighed(hypotheses, failed.findings)
+        options = {suspect.option for group in blamed.ranked.values() for suspect in group}
+        advised = of_options(failed, judged, faults, hypotheses, options, promise, against, unheard)
+        is_part_first = bool(failed_part) or (against or "").endswith(LOOK_FIRST)
+        advised = replace(advised, is_part_first=is_part_first)
+    return with_refusals(advised, failed, promise)
 
 
 def of_outside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothesis], promise: Promise) -> Advised:
     """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside
     it."""
     if not lead.is_advised:
-        return Advised((), check_first(lead))
+        return Advised((), check_first(lead), lead=lead)
     query = failed.query
     beside = _beside(lead, failed, hypotheses, promise)
     odds = _without(failed, promise, [lead.name], beside)
     changes = to_fix(query, beside, odds).changes if beside else ()
-    return Advised((outside_fix(lead, odds, failed.run, changes),), None, lead.why)
+    return Advised((outside_fix(lead, odds, failed.run, changes),), None, lead.why, lead)
 
 
 def with_refusals(advised: Advised, failed: FailedRun, promise: Promise) -> Advised:

@@ -27,6 +27,16 @@ class Blame(Record, eq=False):
     outside: tuple[OutsideSuspect, ...]
     failure: NoisyOr
 
+    @property
+    def ranked(self) -> dict[str, tuple[Suspect, ...]]:
+        """The suspects of which training tells what they do."""
+        return {name: tuple(one for one in group if one.is_identified) for name, group in self.suspects.items()}
+
+    @property
+    def unranked(self) -> dict[str, tuple[Suspect, ...]]:
+        """The others."""
+        return {name: tuple(one for one in group if not one.is_identified) for name, group in self.suspects.items()}
+
 
 def blame(
     judged: Judged,

@@ -9,15 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from care_core.diagnose import provenance
-from care_core.diagnose.advice import (
-    all_back,
-    likelier_than,
-    of_options,
-    of_outside,
-    part_first,
-    shown_back,
-    with_refusals,
-)
+from care_core.diagnose.advice import Advised, advise, all_back, shown_back
 from care_core.diagnose.blame import blame
 from care_core.diagnose.causes import UNSURE, as_in_fix, as_ranked, causes_of
 from care_core.diagnose.circumstances import circumstances, unusual
@@ -27,14 +19,13 @@ from care_core.diagnose.judging import Judged, check_wishes, query_of
 from care_core.diagnose.next_step import again, bench, was_upset
 from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.outside.change import check_first, leading_outside, shown_fix
-from care_core.diagnose.parts import unmended
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult, OutsideSuspect
 from care_core.diagnose.remarks import notes_of, reference_of
 from care_core.diagnose.since import compare, with_evidence
-from care_core.diagnose.tell_more import SAME_AGAIN, AllBack, tell_more, to_record
+from care_core.diagnose.tell_more import SAME_AGAIN, tell_more, to_record
 from care_core.diagnose.unexplained import out_of_reach, refused_otherwise
-from care_core.diagnose.worth import LOOK_FIRST, explained, outweighed, promised_causes
+from care_core.diagnose.worth import explained, promised_causes
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
@@ -108,65 +99,47 @@ def diagnose(
     report("ranking the causes", 0.7)
     query = query_of(judged, profile, keep)
     blamed = blame(judged, profile, query, health, good)
-    weighed, outside, failure = blamed.suspects, blamed.outside, blamed.failure
-    found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
-    unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
-    failed = FailedRun(profile, choice, run, query, reference_of(judged), unranked, health.findings)
-    refused = refused_otherwise(failed, health)
-    unheard = {result.variable.name: refused or out_of_reach(failed, result) for result in broken}
+    failed = FailedRun(profile, choice, run, query, reference_of(judged), blamed.unranked, health.findings)
+    unheard = _unheard(failed, broken, health)
     faults = tuple(
-        Fault(result, () if unheard[name] else causes_of(failed, result, found[name], top))
-        for name, result in ((result.variable.name, result) for result in broken)
+        Fault(result, () if why else causes_of(failed, result, blamed.ranked[result.variable.name], top))
+        for result, why in zip(broken, unheard, strict=True)
     )
-    hypotheses = hypotheses_of(failure)
+    hypotheses = hypotheses_of(blamed.failure)
     report("searching for a fix", 0.85)
-    promise = Promise(failure, query, [result.variable.name for result in broken])
-    as_driven = promise.as_driven()
-    beyond = next(filter(None, unheard.values()), None)
-    part = part_first(failed, health.findings)
-    lead = leading_outside(hypotheses, outside, health.findings, run)
-    is_part_first = False
-    if lead is not None and (part is None or lead.is_found):
-        advised = of_outside(lead, failed, hypotheses, promise)
-    else:
-        lead = None
-        failed_part = part and unmended(part, likelier_than(part, hypotheses, failed))
-        against = failed_part or outweighed(hypotheses, health.findings)
-        is_part_first = bool(failed_part) or (against or "").endswith(LOOK_FIRST)
-        options = {s.option for group in found.values() for s in group}
-        advised = of_options(failed, judged, faults, hypotheses, options, promise, against, beyond)
-    advised = with_refusals(advised, failed, promise)
-    fixes, abstained = advised.fixes, advised.abstained
-    unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
-    if abstained is None and lead is None:
-        faults = tuple(replace(fault, causes=as_in_fix(failed, fault, fixes[0])) for fault in faults)
-    faults = as_ranked(promised_causes(faults, promise), failure, UNSURE if lead is not None else 0.0)
-    advised_odds = as_driven if abstained or fixes[0].odds is None else fixes[0].odds
-    told_more: tuple[str, ...] = ()
-    if unsure and not beyond:
-        is_named = is_part_first or (lead is not None and bool(abstained))
-        everything = all_back(failed, promise, advised_odds)
-        told_more = to_record(faults, run) if is_named else _tell_more(failed, faults, health, everything)
+    promise = Promise(blamed.failure, query, [result.variable.name for result in broken])
+    advised = advise(failed, judged, faults, blamed, hypotheses, promise, next(filter(None, unheard), None))
+    fix, as_driven = advised.fix, promise.as_driven()
+    unsure = fix is None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
+    if fix is not None and advised.lead is None:
+        faults = tuple(replace(fault, causes=as_in_fix(failed, fault, fix)) for fault in faults)
+    faults = as_ranked(promised_causes(faults, promise), blamed.failure, 0.0 if advised.lead is None else UNSURE)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
         run=run,
         objectives=(*judged.results, *judged.checks),
         faults=faults,
-        fix=None if abstained else fixes[0],
-        alternatives=() if abstained else tuple(fixes[1:]),
+        fix=fix,
+        alternatives=advised.alternatives,
         odds_as_driven=as_driven,
-        abstained=abstained,
-        why_this=advised.why or _why_this(fixes, abstained, as_driven, hypotheses, faults),
-        notes=notes_of(failed, broken, None if abstained or lead else fixes[0], as_driven),
+        abstained=advised.abstained,
+        why_this=advised.why or _why_this(fix, as_driven, hypotheses, faults),
+        notes=notes_of(failed, broken, fix if advised.lead is None else None, as_driven),
         missions=judged.missions,
         rivals=circumstances(run, query, schema) if unsure else (),
-        tell_more=told_more,
+        tell_more=_tell_more(failed, faults, advised, promise) if unsure and not any(unheard) else (),
         health=health,
         hypotheses=hypotheses,
-        failure=failure,
-        outside=outside,
+        failure=blamed.failure,
+        outside=blamed.outside,
     )
+
+
+def _unheard(failed: FailedRun, broken: Sequence[ObjectiveResult], health: Health) -> list[str | None]:
+    """Of each objective that was missed why training says nothing of it, None where it does."""
+    refused = refused_otherwise(failed, health)
+    return [refused or out_of_reach(failed, result) for result in broken]
 
 
 def _within_limits(
@@ -201,24 +174,20 @@ def _within_limits(
     )
 
 
-def _why_this(
-    fixes: Sequence[Fix],
-    abstained: str | None,
-    as_driven: float,
-    hypotheses: Sequence[Hypothesis],
-    faults: Sequence[Fault],
-) -> str:
-    return "" if abstained or fixes[0].shown_by else explained(fixes[0], as_driven, hypotheses, faults)
+def _why_this(fix: Fix | None, as_driven: float, hypotheses: Sequence[Hypothesis], faults: Sequence[Fault]) -> str:
+    return "" if fix is None or fix.shown_by else explained(fix, as_driven, hypotheses, faults)
 
 
 def _weights(outside: Sequence[OutsideSuspect]) -> dict[str, float]:
     return {one.name: one.weight for one in outside}
 
 
-def _tell_more(
-    failed: FailedRun, faults: tuple[Fault, ...], health: Health, everything: AllBack | None
-) -> tuple[str, ...]:
-    upset = was_upset(failed.run, health.findings)
+def _tell_more(failed: FailedRun, faults: tuple[Fault, ...], advised: Advised, promise: Promise) -> tuple[str, ...]:
+    """What would tell more: of what is named already, what to record."""
+    if advised.is_part_first or (advised.lead is not None and advised.fix is None):
+        return to_record(faults, failed.run)
+    promised = promise.as_driven() if advised.fix is None or advised.fix.odds is None else advised.fix.odds
+    upset = was_upset(failed.run, failed.findings)
     return tell_more(
         failed.query,
         faults,
@@ -227,7 +196,7 @@ def _tell_more(
         observational=failed.profile.schema.observational,
         again=again(failed.run, upset=upset),
         nothing_else=bench(failed.run) if upset else SAME_AGAIN,
-        all_back=everything,
+        all_back=all_back(failed, promise, promised),
     )
 
 
