@@ -162,7 +162,7 @@ def _of_fix(fix: Fix, diagnosis: Diagnosis, *, upset: bool) -> str:
 def _named(diagnosis: Diagnosis) -> tuple[str, ...]:
     """What to look at: the part or circumstance that is likeliest, and the part that is mended before anything else."""
     part = mend_first(diagnosis.health.findings)
-    first = next((one for one in diagnosis.hypotheses if one.name), None)
+    first = first_named(diagnosis.hypotheses)
     leading = first if first is not None and first.what in ("hardware", "world") else None
     if part is None:
         return (leading.name,) if leading is not None else ()
@@ -180,7 +180,9 @@ def _undone(diagnosis: Diagnosis) -> str:
     """What can be put right at once, empty where nothing is said to be that."""
     run, findings = diagnosis.run, diagnosis.health.findings
     part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
-    if part is not None:
+    leading = first_named(diagnosis.hypotheses)
+    named = leading if leading is not None and leading.what == "parameter" else None
+    if part is not None and (is_pack(part) or named is None or named.probability <= LIKELY):
         is_aside = part.severity != "critical" and first is not None and _leads(first) and first.name != part.title
         return "charge or replace the battery" if is_pack(part) and not is_aside else ""
     if first is not None and first.name == OUTLASTED:
@@ -188,8 +190,6 @@ def _undone(diagnosis: Diagnosis) -> str:
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
     if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
-    leading = first_named(diagnosis.hypotheses)
-    named = leading if leading is not None and leading.what == "parameter" else None
     if named is not None and _is_kept(named.name, diagnosis):
         return f"let {named.name} change as well: without it nothing is likely enough"
     said = None if named is None else next((one for one in findings if _says(one, named.name)), None)
@@ -236,6 +236,10 @@ def _put_back_with(name: str, said: Finding, findings: Iterable[Finding]) -> lis
     return list(dict.fromkeys((name, *(other for one in alike for other in one.parameters))))
 
 
+def _is_spoken_of(name: str, diagnosis: Diagnosis) -> bool:
+    return any(name in one.parameters for one in every_finding(diagnosis.health.findings))
+
+
 def _looked_at(name: str, diagnosis: Diagnosis) -> str:
     """What to do with a parameter outside the profile that leads and whose change is not advised."""
     refused = (one for one in diagnosis.health.findings if one.kind == "prearm" and name in one.parameters)
@@ -244,6 +248,9 @@ def _looked_at(name: str, diagnosis: Diagnosis) -> str:
         return rule  # what the check asks for
     setting = diagnosis.run.settings.get(name)
     value = "" if setting is None else f" {shown(setting.value)}"
+    meaning = meaning_of(name, vehicle_of_run(diagnosis.run).kind)
+    if meaning is not None and meaning.role == "calibration" and _is_spoken_of(name, diagnosis):
+        return f"calibrate again: {name} is{value}"
     suspect = next((one for one in diagnosis.outside if one.name == name), None)
     is_chosen = suspect is not None and suspect.role in ("choice", "wiring")
     back = f"; 'param set {name} {shown(suspect.back)}' puts it back" if suspect is not None and is_chosen else ""

@@ -33,6 +33,10 @@ _MISSED = LIMITS.add("share of the time that was not recorded", 0.2, "", "a choi
 _SILENT_S = LIMITS.add("silence to the end of a flight", 5.0, "s", "EKF2: a height that is so old is given up")
 _LASTS_S = LIMITS.add("shortest time of which this is said", 10.0, "s", "a choice: less is over before it is recorded")
 ASIDE = LIMITS.add("probability that what nothing steers by costs the mission", 0.05, "", "a choice: failsafes read it")
+WATCHED = LIMITS.add(
+    "probability that a record of the battery or the outputs that stands still costs the mission", 0.01, "",
+    "a choice: less than a parameter that nobody knows of; its failsafe has a finding of its own",
+)  # fmt: skip
 UNPOWERED_V = LIMITS.add(
     "most volts of a monitor without a pack", 2.5, "V", "a choice: 1 empty cell; loose inputs say 0.1 V"
 )

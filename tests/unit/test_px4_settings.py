@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 import pytest
 
-from care_core.ecosystems.px4.checks import arming, rotors
+from care_core.ecosystems.px4.checks import arming, calibration, rotors
 from care_core.ecosystems.px4.flight import MESSAGES, STATUS, Px4Flight
 from care_core.ecosystems.px4.preflight import read_by
+from care_core.records import replace
 from care_core.run import Setting
 from tests.unit.test_px4_health import FLOWN, MadeLog, states, words
 
@@ -100,3 +101,60 @@ def test_what_is_wired_is_put_back_where_a_check_refuses_for_it() -> None:
 )
 def test_a_refusal_is_known_by_its_words(says: str, reads: str) -> None:
     assert reads in read_by(says)
+
+
+def test_a_frame_that_control_allocation_does_not_know_is_named() -> None:
+    said = words((1.0, "error", "[control_allocator] Actuator effectiveness init failed"))
+    tables = {STATUS: FLOWN, MESSAGES: said}
+    (found,) = rotors.find(Px4Flight(MadeLog(tables, parameters=quad(CA_AIRFRAME=6.0))))
+    assert (found.parameters, found.wanted) == (("CA_AIRFRAME",), (("CA_AIRFRAME", 0.0),))
+    assert not list(rotors.find(Px4Flight(MadeLog(tables, parameters=quad()))))
+
+
+def test_more_rotors_than_outputs_are_as_many_as_the_airframe_has() -> None:
+    (found,) = rotors.find(flight(quad(CA_ROTOR_COUNT=6.0)))
+    assert found.wanted == (("CA_ROTOR_COUNT", 4.0),)
+    assert found.evidence.startswith("4 of 6 are driven")
+
+
+SIMULATED = {"stack": "PX4", "firmware": "PX4 v1.15.4 (99c40407)", "vehicle": "multicopter", "hardware": "PX4_SITL"}
+
+
+def calibrated(**values: float) -> dict[str, tuple[Setting, ...]]:
+    """PX4 writes calibrations itself: a log says that their defaults are what they are."""
+    used = {f"{name.rpartition('_')[0]}_ID": 1310988.0 for name in values} | values
+    return {name: (Setting(name, value, "ulog", value),) for name, value in used.items()}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sound", "is_simulated"),
+    [
+        ("CAL_ACC0_XSCALE", 3.0, 1.0, False),
+        ("CAL_ACC1_ZOFF", -1.5, 0.0, True),
+        ("CAL_GYRO0_YOFF", 0.7, 0.0, False),
+        ("CAL_MAG0_XOFF", 3.5, 0.0, False),
+        ("CAL_MAG2_YODIAG", -0.9, 0.0, False),
+    ],
+)
+def test_a_calibration_that_no_sensor_needs_is_named(name: str, value: float, sound: float, is_simulated: bool) -> None:
+    log = MadeLog({STATUS: FLOWN}, parameters=calibrated(**{name: value}))
+    (found,) = calibration.find(Px4Flight(replace(log, facts=SIMULATED) if is_simulated else log))
+    assert (found.parameters, found.suspect, found.wanted) == ((name,), "parameter", ())
+    assert found.evidence == f"{name} is {value:g}, {sound:g} is none"
+
+
+def test_what_real_sensors_need_and_the_calibration_of_none_are_not_doubted() -> None:
+    real = calibrated(
+        CAL_ACC1_XOFF=3.8, CAL_ACC0_XSCALE=1.06, CAL_GYRO0_ZOFF=0.12, CAL_MAG0_XOFF=1.15, CAL_MAG0_ZSCALE=0.12
+    )
+    absent = calibrated(CAL_ACC2_XSCALE=3.0) | {"CAL_ACC2_ID": (Setting("CAL_ACC2_ID", 0.0, "ulog", 0.0),)}
+    assert not list(calibration.find(flight(real | absent)))
+
+
+def test_a_refusal_names_the_calibration_that_its_check_reads() -> None:
+    said = words((5.0, "critical", "Preflight Fail: velocity estimate error"), (6.0, "critical", "Arming denied: no"))
+    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
+    off = calibrated(CAL_ACC0_ZOFF=1.5)
+    (found,) = arming.find(Px4Flight(replace(MadeLog(tables, parameters=off), facts=SIMULATED)))
+    assert (found.parameters, found.wanted) == (("CAL_ACC0_ZOFF",), ())
+    assert found.evidence.endswith("CAL_ACC0_ZOFF is 1.5 (default 0): calibrate again")

@@ -171,7 +171,7 @@ def _slow(run: Run, schema: Schema, query: CounterfactualQuery) -> Iterator[Sign
     longer: dict[Sign, float] = {}
     for metric in schema.metrics:
         how = metric.extract
-        if how is None or how.kind != "phase_time" or how.args.get("phase") not in _PHASES:
+        if how is None or not how.kind.endswith("phase_time") or how.args.get("phase") not in _PHASES:
             continue
         sign, seconds = _PHASES[how.args["phase"]], _excess(metric.name, run, query)
         longer[sign] = longer.get(sign, 0.0) + max(0.0, seconds)

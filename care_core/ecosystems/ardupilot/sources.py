@@ -18,6 +18,7 @@ from care_core.ecosystems.base import Limits
 from care_core.ecosystems.findings import FindingKind
 from care_core.ecosystems.liveness import (
     ASIDE,
+    WATCHED,
     ZERO,
     Frozen,
     Live,
@@ -60,13 +61,13 @@ SOURCES = (
     Live("POS", ("Lat", "Lng"), "the estimated position", "estimator", _s("position", 5.0), _SHOWS.place),
     Live("POS", ("RelHomeAlt",), "the estimated height", "estimator", _s("height", 5.0), _SHOWS.height),
     Live("BAT", ("Volt", "Curr"), "the battery's monitor", "battery", _s("battery", 30.0), _ANY, is_optional=True,
-         mission_lost=ASIDE),
+         mission_lost=WATCHED),
     Live("BAT", ("Curr",), "the current sensor", "battery", _s("current sensor", 30.0), _ANY, is_optional=True,
-         mission_lost=ASIDE),
+         mission_lost=WATCHED),
     Live("ARSP", ("Airspeed",), "the airspeed sensor", "airspeed", _s("airspeed", 5.0), _ANY, is_optional=True,
          mission_lost=ASIDE),
     Live("RCOU", tuple(f"C{n}" for n in range(1, 15)), "the record of the motor outputs", "motor", _s("outputs", 10.0),
-         _ANY, is_optional=True, mission_lost=ASIDE),
+         _ANY, is_optional=True, mission_lost=WATCHED),
 )  # fmt: skip
 _SAME_THROTTLE = 0.03
 _ZEROS: Mapping[str, tuple[FindingKind, str, tuple[str, ...]]] = {

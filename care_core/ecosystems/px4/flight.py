@@ -20,9 +20,12 @@ from care_core.ecosystems.liveness import Frozen, Unconnected
 from care_core.ecosystems.px4 import sources
 from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED, Lean, lean_of
 from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
+from care_core.ecosystems.px4.calibration import usual
 from care_core.ecosystems.spans import Span, within
+from care_core.ecosystems.vehicles import is_simulated
 from care_core.logs.base import Log, Table, Wanted
 from care_core.numbers import Bools
+from care_core.records import replace
 from care_core.run import Setting
 
 STATUS, MESSAGES, LANDED = "vehicle_status", "logged_messages", "vehicle_land_detected"
@@ -163,10 +166,16 @@ class Px4Flight(RunModel):
         return float(value) if isinstance(value, (int, float)) else None
 
     def off_default(self, name: str) -> Setting | None:
-        """A parameter that was first driven off its airframe's default; None where it is at it, or the log lacks
-        either."""
+        """A parameter that was first driven off its airframe's default, or a calibration that no sensor needs; None
+        where it is at it, or the log lacks either."""
         setting = next(iter(self.log.settings().get(name, ())), None)
-        return None if setting is None or setting.default in (None, setting.value) else setting
+        if setting is None:
+            return None
+        if isinstance(setting.value, (int, float)):
+            sound = usual(name, float(setting.value), is_simulated=is_simulated(self.log.facts, {}))
+            if sound is not None:
+                return replace(setting, default=sound)
+        return None if setting.default in (None, setting.value) else setting
 
     def killed_s(self, span: Span = (-math.inf, math.inf)) -> float | None:
         """When the kill switch first cut its motors in a span, None where it did not."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import re
 
+from care_core.ecosystems.px4.calibration import calibrations
+
 _CHECKS = (
     (r"geofence violation", "GF_ACTION GF_MAX_HOR_DIST GF_MAX_VER_DIST"),
     (r"first waypoint|too far", "MIS_DIST_1WP"),
@@ -16,11 +18,12 @@ _CHECKS = (
     (r"airspeed data|airspeed selector", "SYS_HAS_NUM_ASPD"),
     (r"optical flow", "SYS_HAS_NUM_OF"),
     (r"\bESC\b", "COM_ARM_CHK_ESCS FD_ESCS_EN"),
-    (r"magnetic interference", "COM_ARM_MAG_STR EKF2_MAG_CHECK EKF2_MAG_CHK_STR EKF2_MAG_CHK_INC"),
-    (r"height estimate (error|not stable)", "COM_ARM_EKF_HGT"),
-    (r"velocity estimate error", "COM_ARM_EKF_VEL"),
-    (r"position estimate error", "COM_ARM_EKF_POS"),
-    (r"yaw estimate error", "COM_ARM_EKF_YAW"),
+    (r"magnetic interference", "COM_ARM_MAG_STR EKF2_MAG_CHECK EKF2_MAG_CHK_STR EKF2_MAG_CHK_INC CAL_MAG"),
+    (r"no valid .*(attitude|position) estimate", "SYS_HAS_GPS EKF2_EN EKF2_IMU_CTRL EKF2_GPS_CTRL"),
+    (r"height estimate (error|not stable)", "COM_ARM_EKF_HGT CAL_ACC"),
+    (r"velocity estimate error", "COM_ARM_EKF_VEL CAL_ACC"),
+    (r"position estimate error", "COM_ARM_EKF_POS CAL_ACC"),
+    (r"yaw estimate error", "COM_ARM_EKF_YAW CAL_MAG CAL_GYRO"),
     (r"GPS fix", "EKF2_GPS_CHECK EKF2_REQ_FIX"),
     (r"GPS satellites", "EKF2_GPS_CHECK EKF2_REQ_NSATS"),
     (r"PDOP", "EKF2_GPS_CHECK EKF2_REQ_PDOP"),
@@ -29,9 +32,9 @@ _CHECKS = (
     (r"GPS speed accuracy", "EKF2_GPS_CHECK EKF2_REQ_SACC"),
     (r"GPS horizontal (pos\w*|speed) drift", "EKF2_GPS_CHECK EKF2_REQ_HDRIFT"),
     (r"GPS vertical (pos\w*|speed) drift", "EKF2_GPS_CHECK EKF2_REQ_VDRIFT"),
-    (r"accelerometer bias", "EKF2_ABL_LIM CAL_ACC0_XOFF CAL_ACC0_YOFF CAL_ACC0_ZOFF"),
-    (r"gyro bias", "EKF2_ABL_GYRLIM CAL_GYRO0_XOFF CAL_GYRO0_YOFF CAL_GYRO0_ZOFF"),
-    (r"attitude failure", "FD_FAIL_R FD_FAIL_P SENS_BOARD_ROT"),
+    (r"accelerometer bias", "EKF2_ABL_LIM CAL_ACC"),
+    (r"gyro bias", "EKF2_ABL_GYRLIM CAL_GYRO"),
+    (r"attitude failure", "FD_FAIL_R FD_FAIL_P SENS_BOARD_ROT CAL_ACC"),
     (r"motor failure", "FD_ACT_EN"),
     (r"flight time", "COM_FLT_TIME_MAX"),
     (r"accels? \d* ?inconsistent", "COM_ARM_IMU_ACC"),
@@ -53,8 +56,15 @@ _CHECKS = (
     (r"safety button", "CBRK_IO_SAFETY"),
     (r"wind speed", "COM_WIND_MAX"),
 )
-"""What a refusal says, case ignored, and what its check reads."""
-_READ_BY = tuple((re.compile(says, re.IGNORECASE), tuple(names.split())) for says, names in _CHECKS)
+"""What a refusal says, case ignored, and what its check reads; of calibrations, what comes before the sensor's number.
+"""
+
+
+def _named(names: str) -> tuple[str, ...]:
+    return tuple(one for name in names.split() for one in (calibrations(name) if name.startswith("CAL_") else (name,)))
+
+
+_READ_BY = tuple((re.compile(says, re.IGNORECASE), _named(names)) for says, names in _CHECKS)
 
 
 def read_by(refusal: str) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from care_core.ecosystems.base import Limits, RunModel
 from care_core.ecosystems.findings import FindingKind
 from care_core.ecosystems.liveness import (
     ASIDE,
+    WATCHED,
     ZERO,
     Frozen,
     Live,
@@ -64,11 +65,11 @@ SOURCES = (
     Live("vehicle_local_position", ("z",), "the estimated height", "estimator", _s("height", 5.0),
          _SHOWS.height),
     Live("battery_status", ("voltage_v", "current_a"), "the battery's monitor", "battery", _s("battery", 30.0), _ANY,
-         is_optional=True, mission_lost=ASIDE),
+         is_optional=True, mission_lost=WATCHED),
     Live("airspeed", ("indicated_airspeed_m_s",), "the airspeed sensor", "barometer", _s("airspeed", 5.0), _ANY,
          is_optional=True, mission_lost=ASIDE),
     Live("actuator_outputs", _axes("output", 8), "the record of the motor outputs", "motor", _s("outputs", 10.0), _ANY,
-         is_optional=True, mission_lost=ASIDE),
+         is_optional=True, mission_lost=WATCHED),
 )  # fmt: skip
 SENSORS = tuple(one for one in SOURCES if one.message in ("vehicle_air_data", "vehicle_magnetometer", *_PLACES))
 """Those whose topic ends where no sensor of theirs is left."""

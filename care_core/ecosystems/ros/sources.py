@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from care_core.ecosystems.base import Limits
-from care_core.ecosystems.liveness import ASIDE, Frozen, Live, Motion, least, numberless, ranged, repeats, turned
+from care_core.ecosystems.liveness import WATCHED, Frozen, Live, Motion, least, numberless, ranged, repeats, turned
 from care_core.ecosystems.ros.messages import (
     BATTERY,
     HEIGHT,
@@ -52,9 +52,9 @@ SOURCES = (
     Live(LOCALISED, (*_PLACE, HEIGHT, *_TURNED), "the localisation", "localisation", _s("localisation", 5.0),
          least(way_m=_FOUND_M), records=3),
     Live(BATTERY, ("voltage", "current"), "the battery's monitor", "battery", _s("battery", 30.0),
-         least(way_m=_DRAWN_M), is_optional=True, mission_lost=ASIDE),
+         least(way_m=_DRAWN_M), is_optional=True, mission_lost=WATCHED),
     Live(BATTERY, ("current",), "the battery's current", "battery", _s("battery's current", 30.0),
-         least(way_m=_DRAWN_M), is_optional=True, mission_lost=ASIDE),
+         least(way_m=_DRAWN_M), is_optional=True, mission_lost=WATCHED),
     *(
         Live(kind, fields, "the command to the base", "commands", _s(f"command ({kind})", 10.0), least(way_m=_CURVE_M),
              is_optional=True)

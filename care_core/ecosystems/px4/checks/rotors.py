@@ -14,13 +14,13 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.px4.flight import MESSAGES, Px4Flight
 from care_core.ecosystems.vehicles.settings import code, number
 from care_core.logs.base import Wanted
 from care_core.run import Setting, shown
 from care_core.text import listed
 
-READS: Wanted = {}
+READS: Wanted = {MESSAGES: ("message",)}
 LIMITS = Limits()
 _OFF_CENTRE = LIMITS.add("lift off the middle, as a share of the arms", 0.3, "", "a choice: a frame is nearly even")
 _TILTED = LIMITS.add("tilt of one rotor alone", 0.1, "", "a choice: 6 degrees; frames tilt all of theirs")
@@ -29,6 +29,7 @@ _MULTIROTOR = 0
 """CA_AIRFRAME of all multicopters."""
 _FIELDS = ("PX", "PY", "AX", "AY", "AZ", "KM", "CT")
 _FIRST_MOTOR = 101
+_NO_FRAME = re.compile(r"actuator effectiveness (init failed|.*null)", re.IGNORECASE)
 _OUTPUT = re.compile(r"(PWM|HIL|UAVCAN|PCA|VOXL|TAP|MODAL|SIM)\w*_FUNC\d+")
 
 Rotors = Mapping[str, Sequence[float]]
@@ -38,6 +39,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     """What a multicopter that was armed is told of its rotors and outputs, where it cannot be."""
     settings = flight.log.settings()
     count = code(settings, "CA_ROTOR_COUNT") or 0
+    if flight.armed:
+        yield from _without_frame(flight)
     if not flight.armed or count < 4 or code(settings, "CA_AIRFRAME") != _MULTIROTOR:
         return
     told = {field: [number(settings, f"CA_ROTOR{n}_{field}") for n in range(count)] for field in _FIELDS}
@@ -70,6 +73,13 @@ def _unbalanced(rotors: Rotors) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield "one rotor that is tilted", ("AX", "AY")
 
 
+def _without_frame(flight: Px4Flight) -> Iterator[Finding]:
+    """A frame that control allocation does not know: it commands no motor."""
+    said = next((text for _, _, text in flight.messages if _NO_FRAME.search(text)), None)
+    if said is not None and (off := _off(["CA_AIRFRAME"], flight)):
+        yield _found(flight, "control allocation knows no such frame", f"'{said}'", off)
+
+
 def _undriven(flight: Px4Flight, settings: Mapping[str, tuple[Setting, ...]], count: int) -> Iterator[Finding]:
     """Motors that no output drives, where others are driven."""
     functions = {name: code(settings, name) for name in settings if _OUTPUT.fullmatch(name)}
@@ -79,6 +89,7 @@ def _undriven(flight: Px4Flight, settings: Mapping[str, tuple[Setting, ...]], co
         return
     off = _off(list(functions), flight)
     taken = {name: one for name, one in off.items() if one.default in [_FIRST_MOTOR + n for n in missing]}
+    taken = taken or _off(["CA_ROTOR_COUNT"], flight)
     if taken:
         motors = listed([f"motor {n + 1}" for n in missing])
         yield _found(
