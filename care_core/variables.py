@@ -303,6 +303,10 @@ class Variable(Record):
             return "true" if value else "false"
         return f"{value:.6g}"
 
+    def told_of(self, value: float) -> str:
+        """What its documentation says where it speaks of this very value; empty where it does not."""
+        return self.doc if re.search(rf"(?<![\w.-]){re.escape(f'{value:g}')}(?![\w.])", self.doc) else ""
+
     def driven(self, value: float | None, is_assumed: bool) -> str:
         """The value that a run had, marked where no source holds it."""
         return f"{self.show(value)}{ASSUMED if is_assumed else ''}"

@@ -211,7 +211,7 @@ def to_fix(query: CounterfactualQuery, assignment: Assignment, probability: floa
                 options[name],
                 query.config[name],
                 assignment[name],
-                change_notes(options[name]),
+                change_notes(options[name], assignment[name]),
                 is_assumed=name in query.assumed,
             )
             for name in order
@@ -234,9 +234,9 @@ def as_likely(predicted: Prediction, together: float) -> Prediction:
     return predicted if predicted.p_ok is None else replace(predicted, p_ok=max(predicted.p_ok, together))
 
 
-def change_notes(option: Variable) -> tuple[str, ...]:
-    """What an operator has to know before changing this option."""
-    notes = []
+def change_notes(option: Variable, to: float | None = None) -> tuple[str, ...]:
+    """What an operator has to know before changing this option. `to`: the new value, whose meaning may be special."""
+    notes = [] if to is None or not option.told_of(to) else [option.told_of(to)]
     if option.reboot_required:
         notes.append("takes effect after a reboot")
     if len(option.parameters) > 1:

@@ -198,6 +198,11 @@ def test_an_operator_is_told_what_a_change_takes() -> None:
     assert change_notes(BY_NAME["accel"]) == ("takes effect after a reboot",)
     assert change_notes(BY_NAME["radius"]) == ("sets 2 keys: /a/radius, /b/radius",)
     assert change_notes(BY_NAME["speed"]) == ()
+    thrust = Variable(
+        "thrust", Role.OPTION, range=(0.0, 100.0), doc="most thrust in a take-off, 0 takes the general limit"
+    )
+    assert change_notes(thrust, 0.0) == (thrust.doc,)
+    assert change_notes(thrust, 10.0) == ()
 
 
 def test_what_options_keep_together_no_suggestion_breaks(planted: Profile) -> None:

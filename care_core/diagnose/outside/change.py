@@ -108,7 +108,8 @@ def refused_beside(findings: Sequence[Finding], run: Run, known: Collection[str]
 def _change(name: str, value: float, wanted: float, run: Run) -> Change:
     option = outside_option(name, wanted, vehicle_of_run(run))
     again = "a reboot" if mended(name) is None else "a restart"
-    return Change(option, value, wanted, (f"takes effect after {again}",) if option.reboot_required else ())
+    notes = (option.told_of(wanted), f"takes effect after {again}" if option.reboot_required else "")
+    return Change(option, value, wanted, tuple(filter(None, notes)))
 
 
 def _is_kept(name: str, kind: Kind) -> bool:
