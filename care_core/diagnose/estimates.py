@@ -19,101 +19,128 @@ class Estimate(Record):
     is_by_hand: bool = False
 
 
-MISSION_LOST_CRITICAL = Estimate(
-    0.95, "a mission fails with what a critical finding shows, where its check does not say",
-    "at 0.9 and 0.98 no leader of 146 is another, its probability moves by 0.003", is_by_hand=True,
-)  # fmt: skip
-MISSION_LOST_WARNING = Estimate(
-    0.6, "a mission fails with what a warning shows, where its check does not say",
-    "at 0.4 and 0.75 no leader of 146 is another, its probability moves by less than 0.001", is_by_hand=True,
-)  # fmt: skip
-MISSION_LOST_INFO = Estimate(
-    0.05, "a mission fails with what is only noted", "no such finding explains", is_by_hand=True
+_declared: list[Estimate] = []
+
+
+def _estimated(value: float, name: str, source: str, *, is_by_hand: bool = False) -> Estimate:
+    """Declare a number that was estimated."""
+    _declared.append(Estimate(value, name, source, is_by_hand))
+    return _declared[-1]
+
+
+def _by_hand(value: float, name: str, source: str) -> Estimate:
+    """Declare a number that is set by hand; `source`: what becomes of the answers where it is another."""
+    return _estimated(value, name, source, is_by_hand=True)
+
+
+MISSION_LOST_CRITICAL = _by_hand(
+    0.95,
+    "a mission fails with what a critical finding shows, where its check does not say",
+    "at 0.9 and 0.98 no leader of 146 is another, its probability moves by 0.003",
 )
-MISSED = Estimate(
-    0.02, "a parameter that is off loses the mission, and training does not show it",
-    "at 0.01 and 0.04 no leader of 146 is another, its probability moves by less than 0.01", is_by_hand=True,
-)  # fmt: skip
-UNMODELLED = Estimate(
-    0.02, "a parameter that the profile does not know loses the mission",
-    "at 0.01, 0.05 and 0.1 no leader of 146 is another, its probability moves by 0.002 to 0.011", is_by_hand=True,
-)  # fmt: skip
-UNSAID = Estimate(
-    0.36, "an option whose value nobody told lost the mission, where none of them was told",
+MISSION_LOST_WARNING = _by_hand(
+    0.6,
+    "a mission fails with what a warning shows, where its check does not say",
+    "at 0.4 and 0.75 no leader of 146 is another, its probability moves by less than 0.001",
+)
+MISSION_LOST_INFO = _by_hand(
+    0.05,
+    "a mission fails with what is only noted",
+    "no such finding explains",
+)
+MISSED = _by_hand(
+    0.02,
+    "a parameter that is off loses the mission, and training does not show it",
+    "at 0.01 and 0.04 no leader of 146 is another, its probability moves by less than 0.01",
+)
+UNMODELLED = _by_hand(
+    0.02,
+    "a parameter that the profile does not know loses the mission",
+    "at 0.01, 0.05 and 0.1 no leader of 146 is another, its probability moves by 0.002 to 0.011",
+)
+UNSAID = _estimated(
+    0.36,
+    "an option whose value nobody told lost the mission, where none of them was told",
     "configurations with each option off at 0.15 that failed twice: 105 of 294 (a copter, move_base, three of Nav2;"
     " 0.30 to 0.41)",
-)  # fmt: skip
-UNTOLD = Estimate(
-    0.3, "what no log shows lost the mission, where no model can be asked; half where a profile fits",
-    "what it leads over has less than 0.3 itself", is_by_hand=True,
-)  # fmt: skip
-USED_UP = Estimate(
-    0.9, "a failsafe of the battery that is all that went wrong ended a flight that outlasted its battery",
-    "nothing else that the log shows draws a pack down", is_by_hand=True,
-)  # fmt: skip
-REFUSING = Estimate(
-    0.98, "an option that the refusing check reads kept the vehicle from arming",
+)
+UNTOLD = _by_hand(
+    0.3,
+    "what no log shows lost the mission, where no model can be asked; half where a profile fits",
+    "what it leads over has less than 0.3 itself",
+)
+USED_UP = _by_hand(
+    0.9,
+    "a failsafe of the battery that is all that went wrong ended a flight that outlasted its battery",
+    "nothing else that the log shows draws a pack down",
+)
+REFUSING = _estimated(
+    0.98,
+    "an option that the refusing check reads kept the vehicle from arming",
     "20 of 20 refused missions of the development sets (Jeffreys: 0.976, 0.88 to 1.0)",
-)  # fmt: skip
-BY_CHANCE_REFUSED = Estimate(
-    0.002, "a vehicle is kept from arming by chance: a check that refuses reads something",
-    "only what the profile does not know stands beside it", is_by_hand=True,
-)  # fmt: skip
-REFUSED_ITSELF = Estimate(
-    0.5, "what a refusal says is the reason itself, where no parameter is likely to be: no position, sensors at odds",
-    "only what the profile does not know stands beside it", is_by_hand=True,
-)  # fmt: skip
-SPOKEN_FOR = Estimate(
+)
+BY_CHANCE_REFUSED = _by_hand(
+    0.002,
+    "a vehicle is kept from arming by chance: a check that refuses reads something",
+    "only what the profile does not know stands beside it",
+)
+REFUSED_ITSELF = _by_hand(
+    0.5,
+    "what a refusal says is the reason itself, where no parameter is likely to be: no position, sensors at odds",
+    "only what the profile does not know stands beside it",
+)
+SPOKEN_FOR = _by_hand(
     0.05,
     "what options have to lose together for a finding about the settings that names none to speak for them",
     "without such findings 2 of 7 ROS missions that failed by their configuration are led by a parameter, with them 6",
-    is_by_hand=True,
 )
-LATE = Estimate(
-    0.1, "share of its weight that a part keeps which failed when the run was failing already by how it was set",
-    "at 0.05 and 0.3 no leader of 146 is another, its probability moves by less than 0.001", is_by_hand=True,
-)  # fmt: skip
-DOUBT = Estimate(
-    0.03, "nothing that is told holds",
+LATE = _by_hand(
+    0.1,
+    "share of its weight that a part keeps which failed when the run was failing already by how it was set",
+    "at 0.05 and 0.3 no leader of 146 is another, its probability moves by less than 0.001",
+)
+DOUBT = _estimated(
+    0.03,
+    "nothing that is told holds",
     "of 121 leading explanations above 0.95 (84 of development failures, 37 of two seeds of their own) 118 were right: "
     "0.029 (Jeffreys, 0.008 to 0.065)",
-)  # fmt: skip
-REPEATS = Estimate(
-    0.8, "what went wrong by chance goes wrong again under the same conditions",
+)
+REPEATS = _by_hand(
+    0.8,
+    "what went wrong by chance goes wrong again under the same conditions",
     "between 0.7 and 0.9 the Brier score of 545 flown resets moves by less than 0.0007 in each of four sets",
-    is_by_hand=True,
-)  # fmt: skip
-BY_CAUSES = Estimate(
-    1.0 / 3.0, "weight of the noisy-OR beside the mechanisms in a promise",
+)
+BY_CAUSES = _estimated(
+    1.0 / 3.0,
+    "weight of the noisy-OR beside the mechanisms in a promise",
     "545 flown resets: between 0.3 and 0.5 the Brier score moves by less than 0.004 in each of four sets",
-)  # fmt: skip
-LEARNED_WEIGHT = Estimate(
-    5.0, "runs at the reference that what is learned of it counts for, beside those counted",
-    "with any from 1 to 50 bad luck leads 4 or 5 of the 146", is_by_hand=True,
-)  # fmt: skip
-COST = Estimate(
+)
+LEARNED_WEIGHT = _by_hand(
+    5.0,
+    "runs at the reference that what is learned of it counts for, beside those counted",
+    "with any from 1 to 50 bad luck leads 4 or 5 of the 146",
+)
+COST = _by_hand(
     0.02,
     "odds that one more change has to bring for the work and the doubt of making it",
     "a cost, declared",
-    is_by_hand=True,
 )
-WORTH = Estimate(
-    0.15, "odds that advice has to add to the run as driven, beyond its cost",
+WORTH = _by_hand(
+    0.15,
+    "odds that advice has to add to the run as driven, beyond its cost",
     "a cost, declared: of 13 changes on development failures that add as much and are less likely than not to repair "
     "the run 10 hold what repaired it, 1 does not, and 2 runs nothing repaired",
-    is_by_hand=True,
-)  # fmt: skip
-NECESSARY = Estimate(
-    0.15, "share of the failures of this configuration that a change takes away where it leaves the likeliest cause",
+)
+NECESSARY = _estimated(
+    0.15,
+    "share of the failures of this configuration that a change takes away where it leaves the likeliest cause",
     "of 125 changes on recorded flights those below were wrong, 110 above right",
-)  # fmt: skip
-CHANCY = Estimate(
-    0.75, "odds of the reference below which it is said that missions fail by chance too",
-    "only a note depends on it", is_by_hand=True,
-)  # fmt: skip
+)
+CHANCY = _by_hand(
+    0.75,
+    "odds of the reference below which it is said that missions fail by chance too",
+    "only a note depends on it",
+)
 
-ESTIMATES = (
-    MISSION_LOST_CRITICAL, MISSION_LOST_WARNING, MISSION_LOST_INFO, MISSED, UNMODELLED, UNSAID, UNTOLD, USED_UP,
-    REFUSING, BY_CHANCE_REFUSED, REFUSED_ITSELF, SPOKEN_FOR, LATE, DOUBT, REPEATS, BY_CAUSES, LEARNED_WEIGHT, COST,
-    WORTH, NECESSARY, CHANCY,
-)  # fmt: skip
+ESTIMATES = tuple(_declared)
+"""All of them."""
