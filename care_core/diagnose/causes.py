@@ -43,14 +43,16 @@ def _cause(failed: FailedRun, result: ObjectiveResult, suspect: Suspect, rank: i
     option = failed.profile.schema.variables[name]
     is_predictable = result.variable.name in query.model.outcomes and name not in query.kept
     best = best_alone(query, name) if is_predictable else None
-    path = describe_path(suspect.path, query, failed.run, by_physics=suspect.by_physics)
+    *steps, end = describe_path(suspect.path, query, failed.run, by_physics=suspect.by_physics)
+    if result.need is not None:  # what its limit is a multiple of: nobody is told two numbers for one thing
+        end = replace(end, expected=result.need.value)
     in_support = query.model.supports(name, query.config[name])
     support = 1.0 if suspect.by_physics else (suspect.effect.support if suspect.effect is not None else None) or 0.0
     changed = query.config if best is None else {**query.config, name: best[0]}
     return Cause(
         rank=rank,
         option=option,
-        path=path,
+        path=(*steps, end),
         path_ace=suspect.path.ace,
         total_effect=suspect.total_effect,
         contribution=suspect.contribution,
