@@ -9,10 +9,9 @@ from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
 from care_core.diagnose.records import Diagnosis, Fix, Hypothesis, first_named, helps
 from care_core.diagnose.remedies import remedy
 from care_core.ecosystems.findings import (
-    IDLED,
+    BY_STICK,
     KILLED,
     NOT_FLOWN,
-    STEERED,
     STOPPED,
     Finding,
     FindingKind,
@@ -141,7 +140,7 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
         return f"{_mended(parts, findings, run)}{then}"
     if any(one.title in (KILLED, STOPPED) for one in findings):
         return f"ask why the motors were cut, and check what the fall broke{then}"
-    if any(one.title in (IDLED, STEERED) for one in findings):
+    if any(one.title in BY_STICK for one in findings):
         return f"look at how it was steered: its throttle stick was down{then}"
     swung = next((one.title for one in findings if one.kind == "tuning" and one.severity == "critical"), None)
     if swung is not None:

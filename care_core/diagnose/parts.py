@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from care_core.ecosystems.findings import (
+    BY_STICK,
     CAME_DOWN,
-    IDLED,
     NO_BATTERY,
     NOT_BEGUN,
     OWN_SUPPLY,
@@ -112,7 +112,7 @@ def unmended(part: Finding, then: str = "") -> str:
     """
     if is_pack(part):
         return f"{part.title}: charge or replace the battery; nothing is changed until it is full"
-    if part.title == IDLED:
+    if part.title in BY_STICK:
         return f"{part.title} at {log_time(part.onset_s)}: no parameter is changed for how it was steered"
     if then:
         return f"{part.title} at {log_time(part.onset_s)}: mend that first; {then}"

@@ -140,6 +140,8 @@ SAGS = "the battery sags under its load"
 BATTERY_FAILSAFE = "battery failsafe"
 STEERED = "it flew into the ground as steered"
 IDLED = "control was lost with the throttle stick at its bottom"
+BY_STICK = frozenset((STEERED, IDLED))
+"""What a pilot's stick brought about: symptoms of which the log does show why."""
 KILLED = "the kill switch cut the motors in the air"
 STOPPED = "the emergency switch stopped the motors in the air"
 UNDRIVEN = "the firmware found a crash while its motors were at rest"

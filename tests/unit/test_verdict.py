@@ -12,7 +12,7 @@ import pytest
 
 import care_core
 from care_core.application.case import Case
-from care_core.diagnose.records import MissionVerdict, ObjectiveResult
+from care_core.diagnose.records import Hypothesis, MissionVerdict, ObjectiveResult
 from care_core.diagnose.verdict import (
     STATUS_WORDS,
     UNKNOWN_PARAMETER,
@@ -22,9 +22,10 @@ from care_core.diagnose.verdict import (
     compose,
     exit_code,
     fit_line,
+    hypothesis_text,
     verdict_of,
 )
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import STEERED, Finding
 from care_core.errors import ExitCode, UsageError
 from care_core.files import bundled
 from care_core.records import replace
@@ -146,11 +147,18 @@ def test_what_a_headline_tells_first_happened_first() -> None:
 def test_how_it_came_down_is_told_once() -> None:
     short = "1 of 3 waypoints were reached; it hit the ground at 27.3 s; battery failsafe at 27.3 s"
     failed = ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", short)
-    steered = Finding("crash", "it flew into the ground as steered", 27.3, 27.3, "critical", "", "")
+    steered = Finding("crash", STEERED, 27.3, 27.3, "critical", "", "")
     assert verdict_on([failed], [steered]).failed == (
         f"1 of 3 waypoints were reached; {steered.title} at 27.3 s; battery failsafe at 27.3 s"
     )
     assert "it hit the ground at 27.3 s" in verdict_on([failed], [replace(steered, onset_s=20.0)]).failed
+
+
+@pytest.mark.parametrize(("title", "is_shown"), [(STEERED, True), ("it crashed", False)])
+def test_the_log_shows_why_what_was_steered_down_crashed(title: str, is_shown: bool) -> None:
+    crash = Finding("crash", title, 27.3, 27.3, "critical", "", "")
+    text = hypothesis_text(Hypothesis("world", title, 0.9, 0.9), [crash])
+    assert text == (title if is_shown else f"{title}; the log does not show why")
 
 
 def test_a_critical_finding_of_a_run_that_met_its_objectives_is_a_fault_that_says_both() -> None:

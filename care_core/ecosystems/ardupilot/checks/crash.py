@@ -26,6 +26,7 @@ _FALL_S = LIMITS.add("fall that may have begun in another mode", 2.0, "s", "free
 _SINKS_M = LIMITS.add("descent in the second before a mode that is a fall", 0.5, "m", "a choice: a landing is as fast")
 _TIPPED = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a choice: order, direction or propellers")
 _CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
+_STEERED = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
 _STRANDED = LIMITS.add("probability of what could not rise", 0.0, "", "it says that the run failed, and nothing of why")
 
 
@@ -77,7 +78,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence="; ".join(filter(None, shown)),
             source="ERR 12, MSG, ATT, IMU, height",
             suspect="operation" if steered else "hardware",
-            probability=_CRASHED,
+            probability=_STEERED if steered else _CRASHED,
         )
 
 

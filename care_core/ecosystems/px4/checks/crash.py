@@ -30,6 +30,7 @@ _IDLES_S = LIMITS.add(
     "time before control is lost in which it is there", 0.4, "s", "a choice: who sees it tip is later"
 )
 _LOST = LIMITS.add("probability of gains, control lost", 0.85, "", "training flights: 14 of 15, else a motor")
+_STEERED = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
 _CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
 
 
@@ -63,7 +64,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
             evidence=f"it came down at {hit.speed_ms:.1f} m/s and {stop}{told}",
             source="vehicle_local_position.z, sensor_combined, manual_control_setpoint",
             suspect="operation" if steered else "hardware",
-            probability=_CRASHED,
+            probability=_STEERED if steered else _CRASHED,
         )
 
 
