@@ -25,7 +25,7 @@ _TAKES_TIME = "find the node that takes the computer's time ('top' on the robot 
 
 _BY_TITLE: tuple[tuple[str, str], ...] = (
     # --- vehicles
-    (r"(motors? .*) (gave no|lost) thrust", r"check \1: its propeller, ESC, solder joints and bearings"),
+    (r"(motors? .*) (gave too little|lost) thrust", r"check \1: its propeller, ESC, solder joints and bearings"),
     (
         "all motors were told to stop",
         "find out what stopped the motors: the land detector, a switch or a failsafe, as the messages around it say",

@@ -80,7 +80,7 @@ class Hardest(Record):
         places = {motor.number: motor.place for motor in motors if motor.place}
         place = f" ({places[self.number]})" if self.number in places else ""
         several = listed([f"motor {n}" for n in (self.number, *self.twins)], "or")
-        return f"{several}{place} gave no thrust"
+        return f"{several}{place} gave too little thrust"
 
 
 def driven_hardest(

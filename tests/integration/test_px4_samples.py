@@ -29,7 +29,7 @@ def test_a_radius_that_cuts_corners_is_the_cause_and_its_value_is_advised(care: 
 def test_a_motor_that_gave_way_is_no_parameter(care: Care) -> None:
     code, found = triaged(care, "px4_motor.ulg")
     assert code == 1
-    assert found["findings"][0]["title"] == "motor 4 (rear right) gave no thrust"
+    assert found["findings"][0]["title"] == "motor 4 (rear right) gave too little thrust"
     assert found["hypotheses"][0]["what"] == "hardware"
     assert not (found["fix"] or {}).get("changes")
 

@@ -133,7 +133,7 @@ def test_a_motor_that_stops_leads_the_crash_it_makes() -> None:
     made.table["RCOU"]["C2"][lost] = 1950
     made.table["RCOU"]["C1"][lost] = 1100
     finding = first(made)
-    assert finding.title == "motor 2 (rear left) gave no thrust"
+    assert finding.title == "motor 2 (rear left) gave too little thrust"
     assert finding.onset_s == pytest.approx(FAILS_S, abs=1.0)
     assert {"attitude", "crash"} <= {one.kind for one in finding.consequences}
 
@@ -675,7 +675,7 @@ def test_a_fall_that_lasts_a_second_is_a_loss_of_control_and_names_the_motor_in_
     for field in ("Roll", "Pitch", "DesRoll", "DesPitch"):
         made.table["ATT"][field][after] = 0.0
     assert made.flight().lost_control_s == pytest.approx(FAILS_S, abs=0.5)
-    assert first(made).title == "motor 2 (rear left) gave no thrust"
+    assert first(made).title == "motor 2 (rear left) gave too little thrust"
 
 
 @pytest.mark.parametrize(("mode", "lost_s"), [(5.0, FAILS_S), (0.0, None)])

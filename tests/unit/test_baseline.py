@@ -97,7 +97,7 @@ def test_what_is_no_good_run_is_refused_with_its_reason(planted: Profile) -> Non
     assert "ends before" in refusal(judged(cut, planted), NOTHING_SEEN)
     plain = replace(run, checks=(Check("armed", 1.0, "it armed"),))
     assert refusal(judged(plain, planted), NOTHING_SEEN) == "no mission was flown"
-    finding = Finding("motor", "motor 1 gave no thrust", 3.0, 9.0, "critical", "seen", "RCOU")
+    finding = Finding("motor", "motor 1 gave too little thrust", 3.0, 9.0, "critical", "seen", "RCOU")
     assert "motor 1" in refusal(judged(run, planted), replace(NOTHING_SEEN, findings=(finding,)))
 
 

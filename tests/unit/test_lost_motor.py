@@ -10,7 +10,7 @@ import pytest
 
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import Finding, every_finding
 from care_core.ecosystems.px4.examining import examine
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.vehicles import Motor
@@ -58,7 +58,7 @@ def under_ardupilot(fall: Fall, kind: tuple[int, int], *changed: Setting, mode: 
 )  # fmt: skip
 def test_a_motor_that_stops_is_named_on_any_frame(kind: tuple[int, int], motor: int, place: str) -> None:
     """By its command before the upset, and everything that follows is its consequence."""
-    fall, name = cut(kind, motor), f"motor {motor} ({place}) gave no thrust"
+    fall, name = cut(kind, motor), f"motor {motor} ({place}) gave too little thrust"
     (by_px4,) = under_px4(fall, settings(geometry(frame(*kind))), pwm=False)
     (by_ardupilot,) = under_ardupilot(fall, kind)
     assert (by_px4.title, by_ardupilot.title) == (name, name)
@@ -72,12 +72,12 @@ def test_a_motor_that_stops_is_named_on_any_frame(kind: tuple[int, int], motor: 
 def test_outputs_of_any_rate_and_unit_name_it(every: int, pwm: bool) -> None:
     parameters = settings({"MAV_TYPE": 2.0, "SYS_AUTOSTART": 4001.0})
     (finding,) = under_px4(cut(QUAD_X, 3), parameters, every=every, pwm=pwm)
-    assert finding.title == "motor 3 (front left) gave no thrust"
+    assert finding.title == "motor 3 (front left) gave too little thrust"
 
 
 def test_a_frame_that_nobody_tells_has_numbers_and_no_places() -> None:
     (finding,) = under_px4(cut(QUAD_X, 3), settings({"MAV_TYPE": 2.0, "SYS_AUTOSTART": 3010.0}))
-    assert finding.title == "motor 3 gave no thrust"
+    assert finding.title == "motor 3 gave too little thrust"
 
 
 def test_a_motor_that_still_gives_a_part_lets_it_fly_on_and_is_a_warning() -> None:
@@ -120,7 +120,7 @@ def test_what_is_no_lost_motor_names_none(event: Callable[[float, Floats], Float
         *under_px4(fall, settings({"MAV_TYPE": 2.0, "SYS_AUTOSTART": 4001.0}), mode),
         *under_ardupilot(fall, QUAD_X, mode=1.0 if mode == 10.0 else 5.0),
     ]
-    assert not [one.title for root in found for one in (root, *root.below) if one.title.endswith("gave no thrust")]
+    assert not [one.title for one in every_finding(found) if one.title.endswith("gave too little thrust")]
 
 
 def test_motors_told_to_stop_in_the_air_are_all_named() -> None:
@@ -183,7 +183,7 @@ def test_a_change_that_did_not_come_before_the_upset_is_not_blamed(changed: list
     for one in changed:
         parameters[one.name] = (*parameters[one.name], one)
     first, *_ = find(Flight(dataflash_log(cut(QUAD_X, 1), frame(*QUAD_X), parameters)))
-    assert first.title == "motor 1 (front right) gave no thrust"
+    assert first.title == "motor 1 (front right) gave too little thrust"
 
 
 def test_a_change_with_no_upset_after_it_is_only_noted() -> None:

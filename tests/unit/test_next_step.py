@@ -77,7 +77,7 @@ def test_a_part_that_failed_is_what_to_look_at_whatever_explains_more() -> None:
 @pytest.mark.parametrize(
     ("kind", "title", "told"),
     [
-        ("motor", "motor 4 (rear right) gave no thrust", "check motor 4 (rear right): its propeller, ESC"),
+        ("motor", "motor 4 (rear right) gave too little thrust", "check motor 4 (rear right): its propeller, ESC"),
         ("surface", "the elevator is at the stop, and the pitch does not follow", "check the elevator: servo"),
         ("gps", "only 5 satellites", "wait under open sky for more satellites before arming"),
         ("gps", "the GPS position jumps by 28 m", "look at the GPS antenna: its view of the sky"),
@@ -93,12 +93,12 @@ def test_each_kind_of_finding_has_an_advice_of_its_own(kind: FindingKind, title:
 
 
 def test_in_a_simulation_no_part_is_mended_and_no_hover_comes_first() -> None:
-    part = Finding("motor", "motor 4 gave no thrust", 50.0, 60.0, "critical", "", "", probability=0.9)
+    part = Finding("motor", "motor 4 gave too little thrust", 50.0, 60.0, "critical", "", "", probability=0.9)
     made, fixed = failed(part), failed(part, fixed=True)
     settings = {**made.run.settings, "SIM_ENGINE_FAIL": Setting("SIM_ENGINE_FAIL", 8.0, "the log")}
     simulated = replace(made.run, settings=settings)
     said = next_step(replace(made, run=simulated), has_failed=True)
-    assert said.endswith("was set in the simulator, or at its model: motor 4 gave no thrust; then run again")
+    assert said.endswith("was set in the simulator, or at its model: motor 4 gave too little thrust; then run again")
     assert "make the change, run again, and" in next_step(replace(fixed, run=simulated), has_failed=True)
     board = replace(made.run, settings=settings, log=replace(made.run.log, facts={"stack": "PX4", "hardware": "V5"}))
     assert "low hover" in next_step(replace(made, run=board), has_failed=True)

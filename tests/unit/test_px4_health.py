@@ -308,7 +308,7 @@ def test_a_fall_without_a_blow_names_the_motor_that_gave_way() -> None:
             "actuator_motors": states(**motors),
         }, **QUAD)]  # fmt: skip
 
-    assert fallen(lies=True) == ["motor 3 (front left) gave no thrust"]
+    assert fallen(lies=True) == ["motor 3 (front left) gave too little thrust"]
     assert "it hit the ground" not in " ".join(fallen(lies=False)), "it climbed again"
 
 

@@ -99,7 +99,7 @@ _ALWAYS = calibrated(
     "a choice: a twisted arm or an uneven load looks the same",
     "an excess from the start on",
 )
-_GAVE_NOTHING = LIMITS.add("probability where it fell towards a motor", 0.85, "", "a choice: outputs are told often")
+_GAVE_LITTLE = LIMITS.add("probability where it fell towards a motor", 0.85, "", "a choice: outputs are told often")
 _PERHAPS = LIMITS.add("probability where it fell, of few records", 0.6, "", "a choice")
 _REPORTED = LIMITS.add("probability of a reported thrust loss", 0.2, "", "a choice: it names who is asked for most")
 _STOPPED = LIMITS.add("probability of a motor that stopped", 0.95, "", "its controller's own word")
@@ -330,7 +330,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         return
     asked_of = outputs.share(asked)
     share = median(asked_of, axis=1)
-    # A motor pushes its own corner up: where it gives nothing, that corner goes down.
+    # A motor pushes its own corner up: where it gives too little, that corner goes down.
     towards = np.array([-(motor.roll * roll + motor.pitch * pitch) for motor in outputs.motors]) / np.hypot(roll, pitch)
     score = np.where(towards > _TOWARDS, share, -1.0)
     n = int(np.argmax(score + 0.2 * towards))
@@ -343,10 +343,11 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     around = (outputs.t > lost - 2.0) & (outputs.t <= lost + 1.0)
     begin = outputs.t[around][outputs.share(around)[n] > _AT_LIMIT]
     yield _finding(
-        outputs.motors[n], "gave no thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0, "critical",
+        outputs.motors[n], "gave too little thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0,
+        "critical",
         f"asked for {100 * share[n]:.0f} % (others {100 * median(others):.0f} %), yet the vehicle fell towards it: "
         f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
-        f"{_SOURCE}, and ATT", _GAVE_NOTHING if near[0].sum() > 3 else _PERHAPS,
+        f"{_SOURCE}, and ATT", _GAVE_LITTLE if near[0].sum() > 3 else _PERHAPS,
     )  # fmt: skip
 
 
