@@ -25,11 +25,11 @@ from care_core.diagnose.next_step import KEPT
 from care_core.diagnose.outside.change import (
     ENOUGH,
     Advisable,
-    asked_by_refusals,
+    asked_beside,
+    asked_by_findings,
     check_first,
     leading_outside,
     outside_fix,
-    refused_beside,
 )
 from care_core.diagnose.parts import mend_first, set_wrong, unmended, was_refused
 from care_core.diagnose.promise import Promise
@@ -126,14 +126,14 @@ def of_outside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothes
 
 
 def with_refusals(advised: Advised, failed: FailedRun, promise: Promise) -> Advised:
-    """The advised change with what else keeps the vehicle from arming: two checks that refuse it both have to pass. A
-    parameter that a check names has one value, the one that its finding says."""
+    """The advised change of a vehicle that never armed with what else its findings ask for: two checks that refuse it
+    both have to pass. A parameter that one names has one value, the one that it says."""
     if advised.abstained is not None or not advised.fixes or not was_refused(failed.findings):
         return advised
     fix = _as_asked(advised.fixes[0], failed, promise)
     advised = replace(advised, fixes=(fix, *advised.fixes[1:]))
     named = {change.option.name: change.suggested for change in fix.changes}
-    more = refused_beside(failed.findings, failed.run, {*named, *failed.query.config})
+    more = asked_beside(failed.findings, failed.run, {*named, *failed.query.config})
     if not more:
         return advised
     outside = [*(named.keys() - failed.query.config), *(change.option.name for change in more)]
@@ -143,8 +143,8 @@ def with_refusals(advised: Advised, failed: FailedRun, promise: Promise) -> Advi
 
 
 def _as_asked(fix: Fix, failed: FailedRun, promise: Promise) -> Fix:
-    """The fix with the values that refusals ask for, where they name its options."""
-    query, asked = failed.query, asked_by_refusals(failed.findings)
+    """The fix with the values that findings ask for, where they name its options."""
+    query, asked = failed.query, asked_by_findings(failed.findings)
     changed = {one.option.name: one.suggested for one in fix.changes}
     if fix.shown_by or changed.keys() - query.config:
         return fix

@@ -13,7 +13,7 @@ Each is a cause of one noisy-OR (`noisy_or`), with the probability that it is th
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -38,11 +38,11 @@ from care_core.diagnose.estimates import (
     USED_UP,
 )
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, Key, NoisyOr, What
-from care_core.diagnose.parts import OUTLASTED, is_late, never_flew, set_wrong
+from care_core.diagnose.parts import OUTLASTED, is_late, never_flew, set_wrong, was_refused
 from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.explains import EXPLAINS
-from care_core.ecosystems.findings import BATTERY_FAILSAFE, SAGS, Finding, Severity, SuspectKind
+from care_core.ecosystems.findings import BATTERY_FAILSAFE, SAGS, Finding, FindingKind, Severity, SuspectKind
 from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import replace
@@ -158,7 +158,7 @@ def unasked(
     if of_battery(missed, findings):
         if used_up(findings):
             options["world", OUTLASTED] = USED_UP.value
-        findings = [one for one in findings if one.kind == "battery" or "battery" in EXPLAINS[one.kind]]
+        findings = [one for one in findings if one.kind == "battery" or _may_bring_about(one, "battery")]
     for finding in critical:
         named = shown[finding.title].options if shown and finding.title in shown else ()
         for option in named:
@@ -235,7 +235,7 @@ def _either(*shares: float) -> float:
 def with_findings(causes: Mapping[Key, float], findings: Iterable[Finding]) -> dict[Key, float]:
     """The causes with what the log shows, in the order told; what came after the impact explains nothing."""
     found = dict(causes)
-    seen = [finding for finding in findings if not finding.after_impact and finding.severity != "info"]
+    seen = [finding for finding in _acting(tuple(findings)) if finding.severity != "info"]
     by_setting = [finding for finding in seen if set_wrong(finding)]
     for finding in seen:
         whole = finding.probability * mission_lost(finding)
@@ -249,6 +249,19 @@ def with_findings(causes: Mapping[Key, float], findings: Iterable[Finding]) -> d
             )
         found |= {key: max(found.get(key, 0.0), share) for key, share in shares.items()}
     return found
+
+
+def _acting(findings: Sequence[Finding]) -> Iterator[Finding]:
+    """The findings that may have lost a run: what came after an impact did not, and a vehicle that was refused lost its
+    run by what keeps one from arming."""
+    is_refused = was_refused(findings)
+    for one in findings:
+        if not one.after_impact and (not is_refused or one.kind == "prearm" or _may_bring_about(one, "prearm")):
+            yield one
+
+
+def _may_bring_about(finding: Finding, kind: FindingKind) -> bool:
+    return kind in EXPLAINS.get(finding.kind, ())
 
 
 def _is_the_reason_itself(finding: Finding, causes: Mapping[Key, float]) -> bool:

@@ -111,6 +111,19 @@ def test_a_finding_that_names_a_parameter_raises_it() -> None:
     assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [replace(stuck, parameters=("b",))])) == ("parameter", "b")
 
 
+def test_a_vehicle_that_never_armed_failed_by_what_refused_it() -> None:
+    refused = Finding(
+        "prearm", "arming was refused", 1.7, 96.0, "critical", "", "", "parameter", 0.4, parameters=("RNGFND6_TYPE",)
+    )
+    creeps = Finding("drive", "it drives", 0.0, 96.0, "critical", "", "", "parameter", 0.9, parameters=("SERVO3_TRIM",))
+    poor = Finding("gps", "only 5 satellites", 0.0, 96.0, "critical", "", "", probability=0.9)
+    both = weigh({}, 0.01, [creeps, refused])
+    assert lead(both) == ("parameter", "RNGFND6_TYPE")
+    assert "SERVO3_TRIM" not in {one.name for one in both}
+    assert lead(weigh({}, 0.01, [creeps])) == ("parameter", "SERVO3_TRIM")
+    assert lead(weigh({}, 0.01, [poor, refused])) == ("hardware", poor.title), "it may have refused it"
+
+
 def test_what_comes_after_the_impact_explains_nothing() -> None:
     assert lead(weigh({"LAND_SPEED": 0.6}, 0.02, [finding(0.95, after_impact=True)]))[0] == "parameter"
 

@@ -13,6 +13,7 @@ import care_core
 from care_core.application.case import Case, predict
 from care_core.diagnose.outside.change import (
     Advisable,
+    asked_beside,
     check_first,
     leading_outside,
     outside_fix,
@@ -233,6 +234,14 @@ def test_a_measured_value_is_advised() -> None:
     found = lead("BATT_VOLT_MULT", 8.2, [named("BATT_VOLT_MULT", ("BATT_VOLT_MULT", 10.1))])
     assert found is not None
     assert (found.is_advised, found.wanted) == (True, 10.1)  # type: ignore[attr-defined]
+
+
+def test_what_else_a_finding_asks_for_goes_with_a_refusal() -> None:
+    run = replace(made_run(), settings={**setting("RNGFND1_TYPE", 47.0, 0.0), **setting("SERVO3_TRIM", 1562.0, 1500.0)})
+    creeps = named("SERVO3_TRIM", ("SERVO3_TRIM", 1500.0))
+    (change,) = asked_beside([creeps, replace(creeps, severity="warning")], run, {"RNGFND1_TYPE"})
+    assert (change.option.name, change.current, change.suggested) == ("SERVO3_TRIM", 1562.0, 1500.0)
+    assert not asked_beside([replace(creeps, severity="warning")], run, ())
 
 
 def test_what_flights_lost_is_advised_but_a_calibration_is_looked_at() -> None:

@@ -86,16 +86,15 @@ def outside_fix(one: Advisable, odds: float, run: Run, beside: Sequence[Change] 
     return Fix((_change(one.name, one.value, one.wanted, run), *beside), odds, {})
 
 
-def asked_by_refusals(findings: Sequence[Finding]) -> dict[str, float]:
-    """The parameters that a refusal to arm names, with the value that its check asks for."""
-    refused = (one for one in every_finding(findings) if one.kind == "prearm" and one.severity == "critical")
-    return {name: value for one in refused for name, value in one.wanted}
+def asked_by_findings(findings: Sequence[Finding]) -> dict[str, float]:
+    """The parameters that a refusal to arm, or anything as grave, names with the value that it asks for."""
+    return {name: value for one in every_finding(findings) if one.severity == "critical" for name, value in one.wanted}
 
 
-def refused_beside(findings: Sequence[Finding], run: Run, known: Collection[str]) -> tuple[Change, ...]:
-    """The parameters besides the known ones that a refusal to arm names, each at the value that its check asks for.
-    What protects, and how the vehicle is built, is left to its operator."""
-    asked = {name: value for name, value in asked_by_refusals(findings).items() if name not in known}
+def asked_beside(findings: Sequence[Finding], run: Run, known: Collection[str]) -> tuple[Change, ...]:
+    """The parameters besides the known ones that findings ask for, each at the value that they say. What protects, and
+    how the vehicle is built, is left to its operator."""
+    asked = {name: value for name, value in asked_by_findings(findings).items() if name not in known}
     kind = vehicle_of_run(run).kind
     told = {name: run.settings[name].value for name in asked if name in run.settings and not _is_kept(name, kind)}
     return tuple(
