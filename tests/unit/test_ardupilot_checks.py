@@ -481,8 +481,9 @@ def test_a_battery_that_was_not_charged() -> None:
     finding = first(made)
     assert (finding.kind, finding.title, finding.severity) == ("battery", "the battery was not charged", "warning")
     assert "3 cells" in finding.evidence
+    assert finding.mission_lost == 0.05, "it held"
     made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
-    assert first(made).severity == "critical"
+    assert (first(made).severity, first(made).mission_lost) == ("critical", None)
 
 
 def test_a_battery_is_no_reason_for_a_refusal_that_names_another() -> None:
@@ -528,6 +529,8 @@ def test_a_sagging_battery() -> None:
     made.table["BAT"]["Volt"][made.after(FAILS_S, DOWN_S)] = 8.7
     assert first(made).title == "the battery sags under its load"
     assert first(made).severity == "critical"
+    assert first(made).probability > 0.5, "a charged pack lasts longer"
+    assert "down to 8.7 V over 2 s, 2.90 V for each of 3 cells" in first(made).evidence
 
 
 def test_a_board_that_loses_its_supply() -> None:

@@ -73,6 +73,16 @@ def test_a_run_in_which_something_critical_was_found_is_no_good_one() -> None:
     assert judged.missions[0].status == "fault"
 
 
+def test_a_pack_that_the_runs_before_have_flown_down_is_told_so() -> None:
+    flown = Made(seed=2)
+    flown.table["BAT"]["Volt"] -= 1.5
+    health = examine(one_after_another(Made(seed=1), flown))
+    (empty,) = [one for one in health.of_run(LATER_S + ARMED_S).findings if one.kind == "battery"]
+    assert "12.5 V before the first run of this log" in empty.evidence
+    (alone,) = [one for one in flown.find() if one.kind == "battery"]
+    assert "before the first run" not in alone.evidence
+
+
 def test_a_parameter_has_the_value_with_which_its_run_began() -> None:
     history = (Setting("BATT_LOW_VOLT", 10.5, "PARM"), Setting("BATT_LOW_VOLT", 9.0, "PARM", changed_at_s=150.0))
     made = Made(seed=1)

@@ -66,6 +66,12 @@ class Flight(Airborne):
             return (self,)
         return tuple(Flight(OneRun(self, own, start)) for own, (start, _) in zip(windows, armed, strict=True))
 
+    @cached_property
+    def whole(self) -> Flight:
+        """The log of which this is one run; itself where it holds no two."""
+        of = self.log.whole if isinstance(self.log, OneRun) else self
+        return of if isinstance(of, Flight) else self
+
     def run_at(self, t: float) -> Flight:
         """The run to which a time belongs."""
         return next((run for run in self.runs if t <= run.end_s), self)

@@ -46,6 +46,10 @@ _CALIBRATION = calibrated(
     "by the share of 3.9 V that is missing: all 16 training flights that rest below it have a drained pack, no other",
     "missing",
 )
+_HELD = LIMITS.add("probability that a pack that held loses a mission", 0.05, "", "none below 3.9 V and above 3.3 did")
+_SOON_S = LIMITS.add("flight after which a charged pack is still strong", 60.0, "s", "a choice: packs last for minutes")
+_WEAK = LIMITS.add("probability of a charged pack that sags deep so soon", 0.9, "", "a choice: worn, or too small")
+_GONE_V = LIMITS.add("drop of a cell at rest since the first run", 0.1, "V", "a choice: it has been flown since")
 _DEEP = LIMITS.add("probability of a pack that sags deep", 0.4, "", "a choice: a weak pack, or a full throttle")
 _SAGS = LIMITS.add("probability of a pack that sags", 0.25, "", "a choice: most packs do at the end of a flight")
 _FAILSAFE = LIMITS.add("probability of a bad pack, failsafe alone", 0.1, "", "a choice: mostly a flight too long")
@@ -73,7 +77,7 @@ def _pack(flight: Flight, battery: Battery, table: Table) -> Iterator[Finding]:
     lowest = smooth(t, table["Volt"], 2.0) / cells
     low = lasting(t, watched & (lowest < CRITICAL), _LASTS_S)
     if rest is not None and rest / cells < NOT_FULL and flight.watched:
-        yield _not_charged(flight, rest, cells, is_low=bool(low))
+        yield _not_charged(flight, rest, cells, float(np.min(lowest[watched])) if low else None)
     elif low:
         deep = bool(lasting(t, watched & (lowest < RUINOUS), _LASTS_S))
         yield _sags(flight, table, low, float(np.min(lowest[watched])), cells, is_deep=deep)
@@ -81,9 +85,11 @@ def _pack(flight: Flight, battery: Battery, table: Table) -> Iterator[Finding]:
         yield _failsafe(flight, failsafe, float(np.interp(failsafe, t, table["Volt"])), cells, rest)
 
 
-def _not_charged(flight: Flight, rest: float, cells: int, *, is_low: bool) -> Finding:
+def _not_charged(flight: Flight, rest: float, cells: int, lowest: float | None) -> Finding:
+    """`lowest`: the voltage of a cell to which it fell, where it fell below the critical level."""
     failsafe = flight.battery_failsafe_s
-    severity: Severity = "critical" if failsafe is not None or is_low else "warning" if flight.armed else "info"
+    is_lost = failsafe is not None or lowest is not None
+    severity: Severity = "critical" if is_lost else "warning" if flight.armed else "info"
     return Finding(
         kind="battery",
         title=UNCHARGED,
@@ -92,15 +98,32 @@ def _not_charged(flight: Flight, rest: float, cells: int, *, is_low: bool) -> Fi
         severity=severity,
         evidence=(
             f"{rest:.1f} V at rest before take-off, {rest / cells:.2f} V for each of {cells} cells "
-            f"(full 4.2, limit {NOT_FULL})" + _and_failsafe(failsafe)
+            f"(full 4.2, limit {NOT_FULL})"
+            + _flown_down(flight, rest, cells)
+            + ("" if lowest is None else f"; down to {_under_load(lowest, cells)}")
+            + _and_failsafe(failsafe)
         ),
         source="BAT.Volt before take-off; voltages of lithium polymer cells",
         probability=calibrated_probability(1 - rest / cells / NOT_FULL, _CALIBRATION),
+        mission_lost=None if is_lost else _HELD,
     )
+
+
+def _flown_down(flight: Flight, rest: float, cells: int) -> str:
+    """What the same pack had before the first run of the log, where that was more."""
+    first = flight.whole.batteries[0].rest_v if flight.whole.batteries else None
+    if first is None or (first - rest) / cells < _GONE_V:
+        return ""
+    return f"; {first:.1f} V before the first run of this log: flown down since then, or another pack"
+
+
+def _under_load(lowest: float, cells: int) -> str:
+    return f"{lowest * cells:.1f} V over {_LASTS_S:g} s, {lowest:.2f} V for each of {cells} cells"
 
 
 def _sags(flight: Flight, table: Table, low: list[Span], lowest: float, cells: int, *, is_deep: bool) -> Finding:
     failsafe = flight.battery_failsafe_s
+    is_weak = is_deep and low[0][0] - flight.watched[0][0] < _SOON_S
     return Finding(
         kind="battery",
         title=SAGS,
@@ -108,11 +131,12 @@ def _sags(flight: Flight, table: Table, low: list[Span], lowest: float, cells: i
         end_s=low[-1][1],
         severity="critical" if is_deep or failsafe is not None else "warning",
         evidence=(
-            f"down to {lowest * cells:.1f} V, {lowest:.2f} V for each of {cells} cells{_load(table, *low[0])}; "
-            f"{CRITICAL} V is the critical level" + _and_failsafe(failsafe)
+            f"down to {_under_load(lowest, cells)}{_load(table, *low[0])}; {CRITICAL} V is the critical level"
+            + ("; a charged pack does not sag so soon: it is worn or too small" if is_weak else "")
+            + _and_failsafe(failsafe)
         ),
         source="BAT.Volt; 3.3 V a cell: ArduPilot, Battery Failsafe",
-        probability=_DEEP if is_deep else _SAGS,
+        probability=_WEAK if is_weak else _DEEP if is_deep else _SAGS,
     )
 
 
