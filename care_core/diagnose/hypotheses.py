@@ -155,6 +155,8 @@ def unasked(
     if not missed and not critical:
         return ()
     options: dict[Key, float] = {("parameter", name): share for name, share in outside.items()}
+    if not missed:  # what is critical is then all that failed
+        findings = [one for one in findings if one in critical or _may_bring_about(one, *(c.kind for c in critical))]
     if of_battery(missed, findings):
         if used_up(findings):
             options["world", OUTLASTED] = USED_UP.value
@@ -260,8 +262,8 @@ def _acting(findings: Sequence[Finding]) -> Iterator[Finding]:
             yield one
 
 
-def _may_bring_about(finding: Finding, kind: FindingKind) -> bool:
-    return kind in EXPLAINS.get(finding.kind, ())
+def _may_bring_about(finding: Finding, *kinds: FindingKind) -> bool:
+    return not EXPLAINS.get(finding.kind, frozenset()).isdisjoint(kinds)
 
 
 def _is_the_reason_itself(finding: Finding, causes: Mapping[Key, float]) -> bool:

@@ -154,6 +154,14 @@ def test_without_a_model_only_a_failure_is_explained() -> None:
     assert lead(unasked([finding(0.9)])) == ("hardware", "motor 2 lost thrust")
 
 
+def test_where_nothing_else_failed_a_critical_finding_is_explained_by_what_may_have_brought_it_about() -> None:
+    sags = replace(finding(0.4), kind="battery", title=SAGS)
+    shaken = replace(finding(0.9, "warning"), kind="vibration", title="strong vibration")
+    assert lead(unasked([sags, shaken])) == ("hardware", SAGS)
+    failed_imu = replace(finding(0.4), kind="imu", title="gyro 1 failed")
+    assert lead(unasked([failed_imu, shaken])) == ("hardware", shaken.title)
+
+
 def test_a_critical_finding_names_its_options_where_no_objective_has_a_value() -> None:
     swings = Finding("tuning", "the steering oscillates", 30.0, 220.0, "critical", "", "", "parameter", 0.85)
     shown = {swings.title: Evidence(30.0, "the steering oscillates", "found", options=("P", "FF"))}
