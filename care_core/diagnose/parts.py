@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from care_core.diagnose.estimates import MISSION_LOST_INFO
 from care_core.ecosystems.findings import (
     BY_STICK,
     CAME_DOWN,
@@ -95,6 +96,8 @@ def _stops(finding: Finding) -> bool:
     is_sure = finding.probability >= LIKELY
     if finding.title == UNCHARGED:
         return is_sure
+    if finding.mission_lost is not None and finding.mission_lost <= MISSION_LOST_INFO.value:
+        return False
     at_limit = finding.kind in ("motor", "thrust") or finding.title == CAME_DOWN
     return finding.severity == "critical" and (is_sure or at_limit)
 

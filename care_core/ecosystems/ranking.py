@@ -1,6 +1,7 @@
 """In which order findings are told: the earliest before the impact that explains the later ones leads them.
 
-Severe before mild, likely before suspected, causes before symptoms, then in order of time.
+Severe before mild, likely before suspected, causes before symptoms, what led to a crash before what led to nothing,
+then in order of time.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ SLACK_S = 1.5
 """
 LIKELY = 0.5
 """A finding at least this probable is told before suspicions of the same severity, and is no consequence of one."""
+MUCH_SURER = 0.2
+"""What is surer by so much, and no consequence of the other, brought about what either may have."""
 OVER_S = 60.0
 """What was over for so long before something began did not bring it about."""
 SYMPTOMS: frozenset[FindingKind] = frozenset(("attitude", "crash", "estimator", "log"))
@@ -45,12 +48,15 @@ def rank_findings(
     told = []
     while left:
         root, *left = left
-        below = [one for one in left if _belongs(root, one, reach)]
+        surer = [one for one in left if _is_much_surer(one, root, reach)]
+        below = [
+            one for one in left if _belongs(root, one, reach) and not any(_belongs(it, one, reach) for it in surer)
+        ]
         led_to = _led_to(root, below, explains)
         left = [one for one in left if one not in below]
         others = [one for one in below if one not in led_to]
         told.append(replace(root, consequences=_in_time(led_to), followed_by=_in_time(others)))
-    return tuple(told)
+    return tuple(sorted(told, key=lambda one: (*_rank(one), not _brought_down(one))))
 
 
 def lost_by(findings: Iterable[Finding], *, is_judged: bool) -> tuple[str, ...]:
@@ -101,6 +107,21 @@ def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
         and root.end_s >= finding.onset_s - OVER_S
         and (finding.probability < LIKELY or (root.probability >= LIKELY and not _only_set(root, finding)))
     )
+
+
+def _is_much_surer(finding: Finding, root: Finding, reach: Explains) -> bool:
+    """Whether a finding stands against another as the cause of what followed both: as grave, much surer, and no
+    consequence of it."""
+    return (
+        _rank(finding) == _rank(root)
+        and finding.probability >= root.probability + MUCH_SURER
+        and not _belongs(root, finding, reach)
+    )
+
+
+def _brought_down(finding: Finding) -> bool:
+    """Whether it led to the loss of a vehicle: that is told before what led to nothing."""
+    return any(one.kind in ("attitude", "crash") for one in finding.consequences)
 
 
 def _needs_no_full_pack(finding: Finding) -> bool:

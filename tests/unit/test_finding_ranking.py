@@ -130,6 +130,18 @@ def test_of_many_consequences_the_critical_ones_are_printed() -> None:
     assert "it crashed (9.0 s) and 2 more" in " ".join(lines.split())
 
 
+def test_what_is_much_surer_brought_about_what_either_may_have() -> None:
+    drifts, torn, crash = finding("barometer", 17.0), finding("surface", 164.0), finding("crash", 192.0)
+    drifts, torn = replace(drifts, probability=0.6, end_s=200.0), replace(torn, probability=0.9, end_s=166.0)
+    told = rank_findings([drifts, torn, crash])
+    assert [(one.kind, [below.kind for below in one.consequences]) for one in told] == [
+        ("surface", ["crash"]),
+        ("barometer", []),
+    ]
+    earlier, *_ = rank_findings([replace(drifts, probability=0.8), torn, crash])
+    assert earlier.kind == "barometer", "about as sure, and first"
+
+
 def test_a_pack_that_was_not_charged_weakens_no_single_motor() -> None:
     empty = replace(finding("battery", 0.0, "warning"), title=UNCHARGED, end_s=80.0)
     motor, weak = finding("motor", 18.0, "warning"), finding("thrust", 20.0, "warning")

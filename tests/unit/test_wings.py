@@ -42,6 +42,22 @@ def test_a_surface_that_turns_it_the_wrong_way(rate_hz: float, channel: str, col
     assert 49.0 < finding.onset_s < 52.0
 
 
+@pytest.mark.parametrize(("mode", "is_used"), [(10.0, True), (0.0, False), (5.0, False), (6.0, True)])
+def test_no_barometer_loses_a_plane_that_is_flown_by_hand(mode: float, is_used: bool) -> None:
+    flown = MadePlane()
+    flown.rows["MODE"] = [(0.0, {"ModeNum": mode})]
+    for number in ("", "#2"):
+        flown.table[f"BARO{number}"]["Alt"] += np.interp(flown.t, [30.0, 70.0], [0.0, 60.0])
+    over = flown.after(80.0)
+    flown.table["ATT"]["Roll"][over] = 175.0
+    flown.table["ATT"]["DesRoll"][over] = 0.0
+    flown.rows["ERR"] = [(82.0, {"Subsys": 12.0, "ECode": 1.0})]
+    drifts = found(flown, "barometer")
+    assert drifts is not None
+    assert drifts.mission_lost is not None
+    assert (drifts.mission_lost > 0.05) == is_used
+
+
 @pytest.mark.parametrize("rate_hz", RATES_HZ)
 def test_a_gust_is_no_reversed_surface(rate_hz: float) -> None:
     flown = MadePlane(rate_hz)

@@ -148,6 +148,7 @@ def test_a_part_that_failed_comes_before_any_parameter(broken: Finding) -> None:
         part("prearm", "arming was refused: Battery 1 voltage failsafe critical >= low", 0.3, suspect="parameter"),
         part("thrust", "too little thrust", 0.1, suspect="parameter"),
         part("blocked", "something blocks the way", 0.9, suspect="world"),
+        replace(part("barometer", "the barometer drifts", 0.9), mission_lost=0.05),
         replace(part("motor", "motor 2 lost thrust", 0.9), after_impact=True),
     ],
     ids=lambda one: one.title,

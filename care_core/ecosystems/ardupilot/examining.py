@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -22,7 +22,9 @@ _TOO_SHORT_S = 2.0
 _OF_SENSORS: frozenset[FindingKind] = frozenset((
     "imu", "compass", "gps", "barometer", "battery", "vibration", "estimator", "attitude",
 ))  # fmt: skip
-_ALT_HOLD = 2
+_BY_HEIGHT: Mapping[str, frozenset[int]] = {"copter": frozenset((2,)), "plane": frozenset((6, 18))}
+_BY_PLACE: Mapping[str, frozenset[int]] = {"copter": frozenset(), "plane": frozenset((7,))}
+"""Modes under the pilot's sticks that hold a height (AltHold; FBWB, QHover), and a course over ground (Cruise)."""
 _UNUSED, _SWITCHED_S = 0.05, 2.0
 """Probability that what it does not fly by loses a mission; a mode switched to so shortly before did not."""
 _TELLING = ("MODE", "MSG", "ATT", "IMU")
@@ -46,13 +48,14 @@ def find(flight: Flight) -> tuple[Finding, ...]:
 
 
 def _unused_at_the_end(flight: Flight) -> frozenset[FindingKind]:
-    """What a copter does not fly by in the mode in which it was lost: those do not explain that it was. Stabilize and
-    its like know neither place nor height, and AltHold no place (ArduCopter/mode.h: requires_GPS)."""
+    """What a vehicle does not fly by in the mode in which it was lost: those do not explain that it was. Stabilize and
+    its like, Manual and FBWA know neither place nor height, and AltHold no place (mode.h: requires_GPS)."""
     lost = min((t for t in (flight.lost_control_s, flight.impact_s) if t is not None), default=None)
     mode = None if lost is None else flight.mode_at(lost - _SWITCHED_S)
-    if mode is None or mode.way != "manual" or not flight.is_copter:
+    kind = "copter" if flight.is_copter else "plane" if flight.is_winged else ""
+    if mode is None or mode.way != "manual" or not kind or mode.number in _BY_PLACE[kind]:
         return frozenset()
-    return frozenset(("gps",)) if mode.number == _ALT_HOLD else frozenset(("gps", "barometer"))
+    return frozenset(("gps",)) if mode.number in _BY_HEIGHT[kind] else frozenset(("gps", "barometer"))
 
 
 def _is_on_a_bench(flight: Flight) -> bool:
