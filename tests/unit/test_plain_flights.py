@@ -229,6 +229,20 @@ def test_a_land_detector_is_believed_over_a_barometer_that_drifted() -> None:
     assert landed(end_s) == 0.0  # disarming says so itself
 
 
+@pytest.mark.parametrize(("idles_s", "falls", "landed"), [(3.0, False, 1.0), (3.0, True, 0.0), (0.2, False, 0.0)])
+def test_a_copter_whose_motors_lift_nothing_and_that_does_not_fall_stands(
+    idles_s: float, landed: float, *, falls: bool
+) -> None:
+    end_s = flown(mode=0).end_s
+    at = np.arange(0.0, 75.0, 0.1)
+    idle = np.clip(at - (end_s - idles_s), 0.0, idles_s)
+    height = np.interp(at, [10.0, 20.0, 30.0, 40.0], [0.0, 60.0, 60.0, 50.0])
+    height += -4.9 * idle**2 if falls else 0.3 * idle  # the air of the propellers no longer presses on the barometer
+    driven = {"ThO": np.where((at > 10.0) & (idle == 0.0), 0.4, 0.0), "Alt": height}
+    barometer = replace(flight()["POS"], times=at, columns=driven)
+    assert checks(flown(mode=0, POS=None, CTUN=barometer))["landed"] == landed
+
+
 @pytest.mark.parametrize(
     ("length_m", "is_unlike"),
     [(201.0, False), (500.0, False), (1200.0, False), (3300.0, True), (60.0, False), (3, True)],

@@ -68,6 +68,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         lost = flight.impact_s is not None or any(code for _, code in flight.errors(_FAILSAFE_BATT))
         severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
         behind = _behind(flight)
+        since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""
         yield Finding(
             kind="thrust",
             title="too little thrust",
@@ -75,7 +76,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             end_s=end,
             severity=severity,
             evidence=(
-                f"throttle above {100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
+                f"throttle above {since}{100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
                 + (f", {below:.1f} m below the height wanted" if below else "")
                 + f"; {100 * before:.0f} % before that"
                 + behind.why

@@ -47,6 +47,8 @@ _TOUCHED_S, _SWITCHED_OFF_S = 5.0, 0.05
 """Before the disarming, where the land detector found the ground: at most, and at least (disarming sets it as well)."""
 _FALLS_S = 2.0
 """What is disarmed in the air falls by 20 m in this time."""
+_IDLES, _RESTS_S, _FREE_FALL = 0.05, 1.0, 9.81 / 2
+"""Throttle that lifts nothing; time of it after which a fall shows, and metres in the square of that time."""
 HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
 """Where heights are told: above home, else above some other ground."""
 
@@ -180,7 +182,7 @@ def _landed(mission: Mission) -> Value:
     low = low or flight_of(mission).stands_at_end
     if not low and flight_of(mission).kind in _GLIDES:
         return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
-    return float(low or _stays_there(mission))
+    return float(low or _stays_there(mission) or _rests(mission))
 
 
 def _stays_there(mission: Mission) -> bool:
@@ -193,6 +195,23 @@ def _stays_there(mission: Mission) -> bool:
     after = (t >= mission.end_s) & (t <= mission.end_s + _FALLS_S)
     seen = t[after]
     return len(seen) > 2 and float(np.ptp(seen)) > _FALLS_S / 2 and 0.0 < float(np.ptp(height[after])) < AIRBORNE_M
+
+
+def _rests(mission: Mission) -> bool:
+    """Whether a copter whose motors lift nothing has stopped falling before it is disarmed: it stands on the ground,
+    whatever its barometer says of that height."""
+    flight = flight_of(mission)
+    if not flight.is_copter or flight.kind == "heli" or flight.throttle is None or flight.height is None:
+        return False
+    driven_t, driven = flight.throttle
+    lifting = driven_t[(driven > _IDLES) & (driven_t >= mission.start_s) & (driven_t <= mission.end_s)]
+    since_s = float(lifting[-1]) if len(lifting) else mission.start_s
+    t, height = flight.height
+    idle = height[(t >= since_s) & (t <= mission.end_s)]
+    lasted = mission.end_s - since_s
+    if lasted < _RESTS_S or len(idle) < 3 or float(np.ptp(idle)) == 0.0:  # a height that is only repeated tells nothing
+        return False
+    return float(idle[0] - idle[-1]) < _FREE_FALL * lasted**2 / 2
 
 
 def _unseen_end(mission: Mission) -> Unavailable | None:
