@@ -1029,6 +1029,25 @@ def test_motor_detection_that_fails_is_told_by_its_thruster() -> None:
     assert found.onset_s == FAILS_S + 2
 
 
+@pytest.mark.parametrize(
+    ("needs", "position_s", "is_told"), [(0.0, 40.0, True), (1.0, 40.0, False), (0.0, 15.0, False)]
+)
+def test_a_rover_that_is_armed_as_it_boots_has_no_position_yet(
+    needs: float, position_s: float, *, is_told: bool
+) -> None:
+    made = Made()
+    made.facts = {"firmware": "ArduRover V4.5.4"}
+    made.settings |= {"ARMING_REQUIRE": needs, "LOG_DISARMED": 0.0}
+    made.rows = {
+        "MODE": [(0.0, {"ModeNum": 0.0})],
+        "MSG": [(position_s, {"Message": "EKF3 IMU0 is using GPS"})],
+        "ERR": [(20.0, {"Subsys": 17.0, "ECode": 1.0}), (41.0, {"Subsys": 17.0, "ECode": 0.0})],
+    }
+    (estimator,) = [one for one in every_finding(made.find()) if one.kind == "estimator"]
+    assert (estimator.title == "it was armed before it had a position") == is_told
+    assert estimator.parameters == (("ARMING_REQUIRE",) if is_told else ())
+
+
 def test_the_noise_of_a_monitor_is_no_cell_more() -> None:
     made = Made()
     made.settings.pop("MOT_BAT_VOLT_MAX")

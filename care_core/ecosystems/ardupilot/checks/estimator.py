@@ -26,9 +26,12 @@ RATIO = LIMITS.add("innovation test ratio", 1.0, "", "AP_NavEKF3: above it a mea
 _LASTS_S = LIMITS.add("shortest rejection", 2.0, "s", "a choice: single outliers are what the test is for")
 _REJECTED = LIMITS.add("probability that the estimator is at fault", 0.2, "", "a choice: mostly its sensors are")
 _SWITCHED = LIMITS.add("probability of a changed lane", 0.3, "", "a choice: it switches to the better sensor")
+_BOOTED = LIMITS.add("probability of ARMING_REQUIRE", 0.9, "", "it is all over once there is a position")
 _EKF_CHECK, _FAILSAFE_EKF, _PRIMARY = 16, 17, 24
 _WORDS = {"SV": "velocity", "SP": "position", "SH": "height", "SM": "magnetic field"}
+_NEEDS_NO_ARMING = "ARMING_REQUIRE"
 _LANE = re.compile(r"(lane switch|EKF primary changed|switching to (compass|IMU|GPS)|EKF Failsafe|EKF variance)", re.I)
+_HAS_POSITION = re.compile(r"EKF\d IMU\d is using GPS|AHRS: EKF\d active")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -59,6 +62,24 @@ def find(flight: Flight) -> Iterator[Finding]:
             probability=_SWITCHED,
         )
         return
+    if not worst and (position_s := _armed_before_position(flight, failed)) is not None:
+        yield Finding(
+            kind="estimator",
+            title="it was armed before it had a position",
+            onset_s=failed[0],
+            end_s=position_s,
+            severity="critical",
+            evidence=(
+                f"EKF check or failsafe at {log_time(failed[0])}, the estimator has a position from "
+                f"{log_time(position_s)} on; {_NEEDS_NO_ARMING} is 0: it is armed as it boots"
+            ),
+            source="ERR, MSG, PARM",
+            suspect="parameter",
+            probability=_BOOTED,
+            parameters=(_NEEDS_NO_ARMING,),
+            wanted=((_NEEDS_NO_ARMING, 1.0),),
+        )
+        return
     start = min([span[0] for span in worst.values()] + failed)
     end = max([span[1] for span in worst.values()] + failed)
     said = [f"{_WORDS[field]} {peak:.1f}" for field, (_, _, peak) in sorted(worst.items(), key=lambda one: one[1][0])]
@@ -76,6 +97,15 @@ def find(flight: Flight) -> Iterator[Finding]:
         source="XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH",
         probability=_REJECTED,
     )
+
+
+def _armed_before_position(flight: Flight, failed: list[float]) -> float | None:
+    """When the estimator first had a position, where a vehicle that needs no arming failed its check before that alone;
+    None where it did not."""
+    if flight.setting(_NEEDS_NO_ARMING) != 0:
+        return None
+    first = min((t for t, text in flight.messages if _HAS_POSITION.match(text)), default=None)
+    return first if first is not None and failed and max(failed) < first else None
 
 
 def _inside(flight: Flight, times: list[float]) -> list[float]:
