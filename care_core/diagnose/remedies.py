@@ -59,6 +59,7 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         r"(.*) turns? the plane the wrong way",
         r"tilt the plane in FBWA and watch \1: where it answers the right way, look for a servo that stuck in flight",
     ),
+    (r"(.*) no longer obeys?", r"look at \1: a servo that stuck, its gears and supply, linkage, horn and hinges"),
     ("the plane stalled", "look at what made it so slow: its lowest airspeed, its weight, its thrust"),
     (r"\w+ turns against its motors", "check the motors' order and directions with the motor test, and the propellers"),
     (

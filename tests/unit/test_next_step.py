@@ -79,6 +79,7 @@ def test_a_part_that_failed_is_what_to_look_at_whatever_explains_more() -> None:
     [
         ("motor", "motor 4 (rear right) gave too little thrust", "check motor 4 (rear right): its propeller, ESC"),
         ("surface", "the elevator is at the stop, and the pitch does not follow", "check the elevator: servo"),
+        ("surface", "the ailerons no longer obey", "look at the ailerons: a servo that stuck"),
         ("gps", "only 5 satellites", "wait under open sky for more satellites before arming"),
         ("gps", "the GPS position jumps by 28 m", "look at the GPS antenna: its view of the sky"),
         ("vibration", "strong vibration (51 m/s^2)", "balance or change the propellers"),

@@ -22,13 +22,18 @@ def test_a_sound_plane_is_silent(rate_hz: float, seed: int) -> None:
     assert MadePlane(rate_hz, seed).find() == ()
 
 
-@pytest.mark.parametrize(("channel", "column", "title"), [
-    ("PIDP", "Elev", "the elevator turns the plane the wrong way"),
-    ("PIDR", "Ail", "the ailerons turn the plane the wrong way"),
+@pytest.mark.parametrize(("channel", "column", "by_hand_s", "title"), [
+    ("PIDP", "Elev", 45.0, "the elevator turns the plane the wrong way"),
+    ("PIDR", "Ail", 45.0, "the ailerons turn the plane the wrong way"),
+    ("PIDP", "Elev", 0.0, "the elevator no longer obeys"),
+    ("PIDR", "Ail", 0.0, "the ailerons no longer obey"),
 ])  # fmt: skip
 @pytest.mark.parametrize("rate_hz", RATES_HZ)
-def test_a_surface_that_turns_it_the_wrong_way(rate_hz: float, channel: str, column: str, title: str) -> None:
+def test_a_surface_that_turns_it_the_wrong_way(
+    rate_hz: float, channel: str, column: str, by_hand_s: float, title: str
+) -> None:
     flown = MadePlane(rate_hz)
+    flown.rows["MODE"] = [(0.0, {"ModeNum": 0.0}), (by_hand_s, {"ModeNum": 10.0})]
     attitude = {"PIDP": "Pitch", "PIDR": "Roll"}[channel]
     now = flown.after(50.0, 53.0)
     flown.table["AETR"][column][now] = 4500.0
@@ -292,4 +297,4 @@ def test_a_surface_whose_trim_is_off_is_not_reversed(offset: float) -> None:
     flown.table["PIDR"]["Act"][now] = -20.0
     flown.table["ATT"]["Roll"][now] -= 20.0 * (flown.t[now] - 50.0)
     titles = [one.title for one in every_finding(flown.find())]
-    assert ("the ailerons turn the plane the wrong way" in titles) == (offset == 0.0)
+    assert ("the ailerons no longer obey" in titles) == (offset == 0.0)

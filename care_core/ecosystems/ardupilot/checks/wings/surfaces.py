@@ -45,6 +45,11 @@ _WRONG_WAY = LIMITS.add(
 _STUCK = LIMITS.add(
     "probability of one at its stop", 0.3, "", "4 of 14 simulated flights: gains, limits and a stall hold it there, too"
 )
+_FLOWN_S = LIMITS.add(
+    "flight that no reversed surface allows", 10.0, "s", "a choice: a controller drives it over in one"
+)
+_MANUAL = 0
+"""The mode in which no controller moves a surface."""
 _FULL = 4500.0
 """AETR of a surface out to its stop (SRV_Channel.h)."""
 _FEWEST = 20
@@ -81,6 +86,8 @@ class _Flown(NamedTuple):
     wanted: Floats
     rate: Floats
     angle: Floats
+    mode: Floats
+    """Number of the mode."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -109,7 +116,8 @@ def _flown(flight: Flight, surface: _Surface, level: Floats) -> _Flown | None:
     out = np.interp(t, outs.t, outs[surface.output]) / _FULL
     angle = np.interp(t, leans.t, np.degrees(np.unwrap(np.radians(leans[surface.attitude]))))
     middle = straight.held_at(level, outs, surface.output) / _FULL if len(level) else 0.0
-    return _Flown(t[acts], out[acts], middle, rates["Tar"][acts], rates["Act"][acts], angle[acts])
+    mode = flight.modes_at(t[acts])
+    return _Flown(t[acts], out[acts], middle, rates["Tar"][acts], rates["Act"][acts], angle[acts], mode)
 
 
 def _wrong_way(surface: _Surface, flown: _Flown) -> Finding | None:
@@ -119,20 +127,35 @@ def _wrong_way(surface: _Surface, flown: _Flown) -> Finding | None:
     start, end, side, turned = found[0]
     out = float(np.max(np.abs(flown.out[during([(start, end)], flown.t)])))
     way, goes = _WAYS[surface.attitude, side]
+    many = surface.verb == "are"
+    obeyed = _has_obeyed(flown, start)
+    what = f"no longer obey{'' if many else 's'}" if obeyed else f"turn{'' if many else 's'} the plane the wrong way"
     return Finding(
         kind="surface",
-        title=f"{surface.name} turn{'s' if surface.verb == 'is' else ''} the plane the wrong way",
+        title=f"{surface.name} {what}",
         onset_s=start,
         end_s=end,
         severity="critical",
         evidence=(
             f"{way} by {100 * out:.0f} % of the travel, and {goes} by {turned:.0f} deg within {end - start:.1f} s "
-            f"(limit {_TURNED_DEG:g}): reversed, stuck or torn off"
+            f"(limit {_TURNED_DEG:g}): "
+            + (
+                "stuck, hard over or torn off, for the autopilot flew by it before"
+                if obeyed
+                else "reversed, stuck or torn off"
+            )
         ),
         source=f"AETR.{surface.output}, {surface.controller}.Tar, Act, ATT.{surface.attitude}",
         probability=_WRONG_WAY,
         mission_lost=_WRONG_WAY,
     )
+
+
+def _has_obeyed(flown: _Flown, until_s: float) -> bool:
+    """Whether the autopilot flew by the surface before: with a reversed one each correction grows."""
+    steps = np.diff(flown.t, prepend=flown.t[0])
+    flies = (flown.t < until_s) & (flown.mode != _MANUAL) & (steps < _FRESH_S)
+    return float(np.sum(steps[flies])) > _FLOWN_S
 
 
 _WAYS = {
