@@ -329,6 +329,16 @@ def test_a_stick_that_is_the_thrust_and_down_steers_into_the_ground(
     assert (STEERED in [title for _, title, _ in found]) == is_steered
 
 
+def test_a_failsafe_that_only_warns_is_not_said_to_have_acted() -> None:
+    def told(*said: str) -> list[str]:
+        status = states(arming_state=[(0, 2)], failsafe=[(0, 0)])
+        spoken = words(*((30.0, "WARNING", text) for text in said))
+        return texts(examine(Px4Flight(MadeLog({"vehicle_status": status, "logged_messages": spoken}))), "failsafe")
+
+    assert told("Failsafe warning", "[failsafe] Failsafe activated") == ["Failsafe warning"]
+    assert told("[failsafe] Failsafe activated") == ["Failsafe activated"]
+
+
 @pytest.mark.parametrize(("down_s", "mode", "idled"), [(29.0, 0, True), (30.2, 0, False), (29.0, 2, False)])
 def test_motors_that_idle_with_the_stick_down_hold_no_attitude(down_s: float, mode: int, idled: bool) -> None:
     t = np.arange(0.0, 60.0, 0.1)

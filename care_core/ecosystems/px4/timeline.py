@@ -50,6 +50,8 @@ _ROUTINE = re.compile(
     r"|home set|mavlink: |ROMFS|Takeoff detected|Landing detected|arming warning|notify"
 )
 _SPOKEN_LEVELS = frozenset(("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING"))
+_ACTED, _WARNED, _SAID_TOGETHER_S = "Failsafe activated", "Failsafe warning", 0.5
+"""What is said of every failsafe until 1.16, and with it of one that only warns (failsafe/framework.cpp)."""
 _SPOKEN_BY = re.compile(r"\[(commander|navigator|failsafe|flight_mode_manager|vtol_att_control|land_detector)\]")
 
 
@@ -142,9 +144,11 @@ def _states(flight: Px4Flight) -> Iterator[Event]:
 def _spoken(flight: Px4Flight) -> Iterator[Event]:
     """Warnings of anybody, and what the parts that fly it say."""
     spoken = []
+    warned = [t for t, _, text in flight.messages if without_speaker(text).startswith(_WARNED)]
     for t, level, text in flight.messages:
         is_loud = level in _SPOKEN_LEVELS or (_SPOKEN_BY.match(text) is not None and not _ROUTINE.search(text))
-        if not is_loud or is_complaint(text) or is_arming(text):
+        only_warned = without_speaker(text) == _ACTED and any(abs(t - at) < _SAID_TOGETHER_S for at in warned)
+        if not is_loud or is_complaint(text) or is_arming(text) or only_warned:
             continue
         kind = "failsafe" if "failsafe" in text.casefold() else "crash" if "crash" in text.casefold() else "message"
         spoken.append(Event(t, kind, without_speaker(text), MESSAGES))
