@@ -8,6 +8,7 @@ from care_core.causal.model import EffectRecord
 from care_core.diagnose.failed_run import FailedRun
 from care_core.diagnose.fixes import best_alone, change_notes, prediction
 from care_core.diagnose.noisy_or import NoisyOr
+from care_core.diagnose.parts import never_flew
 from care_core.diagnose.ranking import Suspect, describe_path, not_ruled_out
 from care_core.diagnose.records import Cause, Confidence, Fault, Fix, Note, ObjectiveResult
 from care_core.records import replace
@@ -24,7 +25,7 @@ HIGH_SUPPORT, LOW_SUPPORT = 0.8, 0.5
 
 def causes_of(failed: FailedRun, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
     """Options that cost this run, those that a failed check names first; where none of them convinces, a few leads
-    that are not ruled out behind them."""
+    that are not ruled out behind them. What acts in flight alone kept no vehicle from arming."""
     others = not_ruled_out(failed.query, result.variable.name, found)
     refused = failed.run.refused_by if result.variable.kind == "functional" else frozenset()
     first = [suspect for suspect in (*found, *others) if suspect.option in refused]
@@ -34,7 +35,7 @@ def causes_of(failed: FailedRun, result: ObjectiveResult, found: tuple[Suspect, 
         named = [suspect for suspect in found if suspect in named or suspect in weak[: max(0, MOST_LEADS - len(named))]]
         weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION > suspect.weight]
         named += [*weak, *others][: max(0, MOST_LEADS - len(named))]
-    named = first + [suspect for suspect in named if suspect not in first]
+    named = first + [one for one in named if one not in first and not never_flew(failed.findings)]
     return tuple(_cause(failed, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
 
 

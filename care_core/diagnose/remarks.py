@@ -15,8 +15,8 @@ from care_core.diagnose.worth import by_chance
 
 def reference_of(judged: Judged) -> str:
     """Whose configuration the run was judged against, and how far from it it was driven."""
-    off = len(deviating(judged.run.config, judged.reference.config))
-    count = f"{off} parameter differs" if off == 1 else f"{off} parameters differ"
+    off, known = len(deviating(judged.run.config, judged.reference.config)), len(judged.reference.config)
+    count = f"{off} of the profile's {known} parameters differ{'s' * (off == 1)}"
     return f"compared with {judged.reference.source}; {count}"
 
 

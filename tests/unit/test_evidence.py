@@ -14,6 +14,7 @@ from care_core.diagnose.circumstances import circumstances
 from care_core.diagnose.judging import judge, query_of, read_and_judge
 from care_core.diagnose.tell_more import experiment
 from care_core.diagnose.triage import diagnose, triage
+from care_core.ecosystems.findings import Finding, Health
 from care_core.ecosystems.registry import run_model
 from care_core.errors import ProfileError
 from care_core.extract.select import choose_profile
@@ -108,6 +109,19 @@ def test_a_refusing_check_names_an_option_that_the_model_knows_nothing_of(plante
     cause = diagnose(judge(run, SCHEMA, planted.model), planted, CHOICE).faults[0].causes[0]
     assert cause.option.name == "inert"
     assert not cause.is_lead
+
+
+def test_of_what_never_armed_what_the_refusal_names_is_the_only_cause(planted: Profile) -> None:
+    refused = Finding("prearm", "arming was refused: too few satellites", 1.0, 9.0, "critical", "", "MSG")
+
+    def told(run: Run, *findings: Finding) -> list[str]:
+        health = Health("", (), findings)
+        (fault,) = diagnose(judge(run, SCHEMA, planted.model), planted, CHOICE, health=health).faults
+        return [cause.option.name for cause in fault.causes]
+
+    assert told(planted_run(min_sats=14))
+    assert told(planted_run(min_sats=14), refused) == []
+    assert told(refused_run(min_sats=14), refused) == ["min_sats"]
 
 
 def test_a_message_in_flight_is_a_note_and_no_proof(planted: Profile) -> None:
