@@ -468,9 +468,11 @@ def alone(share: float, as_driven: float | None) -> str:
 
 
 def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = (), outside: Sequence[SeenSuspect] = ()) -> str:
-    """An explanation in a clause, with how likely it acted beside those above it where that is another matter."""
+    """An explanation in a clause, with how likely it acted beside those above it where that is another matter. What
+    likely did has to be right before the next run, however little is left for it to explain alone."""
     is_both = one.what != "chance" and one.acts - one.probability >= AS_WELL
-    too = f"; {percent(one.acts)} that it acted as well" if is_both else ""
+    advice = ", so put it right too" if one.acts >= LIKELY else ""
+    too = f"; {percent(one.acts)} that it acted as well{advice}" if is_both else ""
     return f"{_explanation(one, findings, outside)}{too}"
 
 

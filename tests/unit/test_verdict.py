@@ -154,6 +154,18 @@ def test_how_it_came_down_is_told_once() -> None:
     assert "it hit the ground at 27.3 s" in verdict_on([failed], [replace(steered, onset_s=20.0)]).failed
 
 
+@pytest.mark.parametrize(
+    ("acts", "told"),
+    [
+        (0.87, "the parameter LOW; 87% that it acted as well, so put it right too"),
+        (0.3, "the parameter LOW; 30% that it acted as well"),
+        (0.1, "the parameter LOW"),
+    ],
+)
+def test_what_likely_acted_beside_the_first_is_put_right_too(acts: float, told: str) -> None:
+    assert hypothesis_text(Hypothesis("parameter", "LOW", 0.05, acts)) == told
+
+
 @pytest.mark.parametrize(("title", "is_shown"), [(STEERED, True), ("it crashed", False)])
 def test_the_log_shows_why_what_was_steered_down_crashed(title: str, is_shown: bool) -> None:
     crash = Finding("crash", title, 27.3, 27.3, "critical", "", "")
