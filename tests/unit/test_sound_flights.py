@@ -292,6 +292,7 @@ def test_what_keeps_its_height_once_its_motors_stop_stands_on_higher_ground(
     height = np.clip(3.0 - sinks_ms * np.clip(made.t - off_s, 0.0, None), 0.0, None) + made.noise(noise_m)
     for name, field in HEIGHTS:
         made.table[name][field][made.after(60.0)] = height[made.after(60.0)]
+    made.table["CTUN"]["ThO"][made.after(60.0, off_s)] = 0.3
     mission = Mission(made.flight(), made.tables(), 5.0, off_s, True, {})
     assert {one.name: one.value for one in plain_checks(mission)}["landed"] == landed
 
