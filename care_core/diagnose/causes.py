@@ -25,17 +25,18 @@ HIGH_SUPPORT, LOW_SUPPORT = 0.8, 0.5
 
 def causes_of(failed: FailedRun, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
     """Options that cost this run, those that a failed check names first; where none of them convinces, a few leads
-    that are not ruled out behind them. What acts in flight alone kept no vehicle from arming."""
+    that are not ruled out behind them; none of a vehicle that never armed, which no flight shows anything of."""
     others = not_ruled_out(failed.query, result.variable.name, found)
     refused = failed.run.refused_by if result.variable.kind == "functional" else frozenset()
     first = [suspect for suspect in (*found, *others) if suspect.option in refused]
     named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
-    if not first and (not named or named[0].contribution < CONVINCING):
+    is_open = not named or named[0].contribution < CONVINCING
+    if is_open and not first and not never_flew(failed.findings):
         weak = [suspect for suspect in found if suspect.contribution < MIN_CONTRIBUTION <= suspect.weight]
         named = [suspect for suspect in found if suspect in named or suspect in weak[: max(0, MOST_LEADS - len(named))]]
         weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION > suspect.weight]
         named += [*weak, *others][: max(0, MOST_LEADS - len(named))]
-    named = first + [one for one in named if one not in first and not never_flew(failed.findings)]
+    named = first + [suspect for suspect in named if suspect not in first]
     return tuple(_cause(failed, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
 
 
