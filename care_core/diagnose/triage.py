@@ -183,7 +183,7 @@ def _weights(outside: Sequence[OutsideSuspect]) -> dict[str, float]:
 
 
 def _tell_more(failed: FailedRun, faults: tuple[Fault, ...], advised: Advised, promise: Promise) -> tuple[str, ...]:
-    """What would tell more: of what is named already, what to record."""
+    """How to find out more; of what is named already, what to record."""
     if advised.is_part_first or (advised.lead is not None and advised.fix is None):
         return to_record(faults, failed.run)
     promised = promise.as_driven() if advised.fix is None or advised.fix.odds is None else advised.fix.odds
