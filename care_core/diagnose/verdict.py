@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal, Protocol, TypeVar
 
 from care_core.diagnose.next_step import next_step
-from care_core.diagnose.records import Confidence, Diagnosis, Hypothesis, Since, Status, helps
+from care_core.diagnose.records import UNLIKELY, Confidence, Diagnosis, Hypothesis, Since, Status, helps
 from care_core.ecosystems.findings import BY_STICK, WHOLE_LOG, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
@@ -128,6 +128,8 @@ class Advice(Record):
     """Whether a value of the change is one that no training run came near."""
     cause: float | None = None
     """Probability that what is changed caused the failure; None where it is not among what explains it."""
+    alone: str = ""
+    """The one of several changes that explains it; the others only add to the odds. Empty where more of them do."""
     confidence: Confidence | None = None
     """How well training supports that."""
     by_hand: bool = False
@@ -153,9 +155,10 @@ class Advice(Record):
             return ""
         if self.cause is None:
             return f" ({self.confidence} confidence in the cause)"
-        together = " together" if ", " in self.change else ""
+        together = " together" if ", " in self.change and not self.alone else ""
         doubt = ", weak training support" if self.confidence == "low" else ""
-        return f" ({percent(self.cause)} the cause{together}{doubt})"
+        alone = f"{self.alone} " if self.alone else ""
+        return f" ({alone}{percent(self.cause)} the cause{together}{doubt})"
 
 
 class Verdict(Record):
@@ -252,6 +255,13 @@ def share_of(changed: Collection[str], hypotheses: Sequence[Hypothesis]) -> floa
     return min(sum(shares), 1.0) if shares else None
 
 
+def alone_of(changed: Collection[str], hypotheses: Sequence[Hypothesis]) -> str:
+    """Which of several changed parameters explains the failure, empty where more than one of them may have acted."""
+    acts = {one.name: one.acts for one in hypotheses if one.what == "parameter" and one.name in changed}
+    acted = [name for name, share in acts.items() if share >= UNLIKELY]
+    return acted[0] if len(acted) == 1 and len(changed) > 1 else ""
+
+
 def _advice(diagnosis: Diagnosis) -> Advice:
     fix = diagnosis.fix
     if fix is None:
@@ -264,6 +274,7 @@ def _advice(diagnosis: Diagnosis) -> Advice:
         odds_as_driven=diagnosis.odds_as_driven,
         is_guess=fix.is_guess,
         cause=share_of(changed, diagnosis.hypotheses),
+        alone=clean(alone_of(changed, diagnosis.hypotheses)),
         confidence=next((cause.confidence for cause in causes if cause.option.name in changed), None),
         by_hand=fix.by_hand,
         why=clean(why_of(fix.shown_by, diagnosis.abstained, diagnosis.why_this)),

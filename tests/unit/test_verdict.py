@@ -19,6 +19,7 @@ from care_core.diagnose.verdict import (
     Advice,
     Reason,
     Verdict,
+    alone_of,
     compose,
     exit_code,
     fit_line,
@@ -249,3 +250,16 @@ def test_what_is_less_likely_is_named_where_nothing_has_a_name() -> None:
     leading = [Reason(0.3, "the parameter a", "a", True)] * REASONS_SHOWN
     rest = [Reason(0.05, "", "", True), Reason(0.04, "bad luck", ""), Reason(0.03, "the parameter b", "b", True)]
     assert list(reason_lines([*leading, *rest]))[-1] == f"{' ' * 8}less likely: {UNKNOWN_PARAMETER}, b"
+
+
+def test_of_several_changes_the_one_that_explains_it_is_named_as_the_cause() -> None:
+    lean = Hypothesis("parameter", "ANGLE_MAX", 0.97, 0.97)
+    speed = Hypothesis("parameter", "WPNAV_SPEED", 0.01, 0.6)
+    changed = {"ANGLE_MAX", "WPNAV_SPEED"}
+    assert alone_of(changed, [lean]) == "ANGLE_MAX"
+    assert alone_of(changed, [lean, speed]) == ""
+    assert alone_of({"ANGLE_MAX"}, [lean]) == ""
+    change = "ANGLE_MAX 969 -> 3000, WPNAV_SPEED 485 -> 1000"
+    both = Advice(change, 0.84, 0.0, cause=0.97, alone="ANGLE_MAX", confidence="high")
+    assert "(ANGLE_MAX 97% the cause)" in str(both)
+    assert "(97% the cause together)" in str(replace(both, alone=""))
