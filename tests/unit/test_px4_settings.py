@@ -140,7 +140,7 @@ def test_a_calibration_that_no_sensor_needs_is_named(name: str, value: float, so
     log = MadeLog({STATUS: FLOWN}, parameters=calibrated(**{name: value}))
     (found,) = calibration.find(Px4Flight(replace(log, facts=SIMULATED) if is_simulated else log))
     assert (found.parameters, found.suspect, found.wanted) == ((name,), "parameter", ())
-    assert found.evidence == f"{name} is {value:g}, {sound:g} is none"
+    assert found.evidence == f"{name} is {value:g}, where {sound:g} corrects nothing"
 
 
 def test_what_real_sensors_need_and_the_calibration_of_none_are_not_doubted() -> None:

@@ -34,7 +34,9 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
                 onset_s=flight.armed[0][0],
                 end_s=flight.armed[-1][1],
                 severity="warning",
-                evidence="; ".join(f"{one.name} is {shown(one.value)}, {shown(one.default)} is none" for one in off),
+                evidence="; ".join(
+                    f"{one.name} is {shown(one.value)}, where {shown(one.default)} corrects nothing" for one in off
+                ),
                 source="parameters CAL_*",
                 suspect="parameter",
                 parameters=tuple(one.name for one in off),
