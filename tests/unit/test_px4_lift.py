@@ -5,19 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from care_core.ecosystems.findings import every_finding
+from care_core.ecosystems.findings import Finding, every_finding
 from care_core.ecosystems.px4.examining import examine
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.px4.missions import _checks
 from care_core.logs.base import Table
-from care_core.run import Unavailable
+from care_core.run import Setting, Unavailable
 from tests.unit.test_px4_health import FLOWN, MadeLog, states
 
 ARMED = (10.0, 50.0)
 
 
-def found(lift: float, sinks: float, wanted: float, lasts_s: float, baro: float = 1.0) -> list[tuple[str, str]]:
+def found(
+    lift: float, sinks: float, wanted: float, lasts_s: float, baro: float = 1.0, **parameters: float
+) -> list[Finding]:
     """Findings of a flight that hovers, and from 20 s on, for a time, is asked for a lift and sinks so fast (m/s)."""
+    shipped = {"MPC_THR_MIN": 0.12, "MPC_THR_MAX": 1.0}
     end = 20.0 + lasts_s
     steps = [(0.0, 0.0), *((20.0 + 0.1 * n, sinks * 0.1 * n) for n in range(int(10 * lasts_s)))]
     log = MadeLog({
@@ -27,10 +30,8 @@ def found(lift: float, sinks: float, wanted: float, lasts_s: float, baro: float 
         "vehicle_local_position_setpoint": states(vz=[(0, 0.0), (20, wanted), (end, 0.0)]),
         "vehicle_thrust_setpoint": states(**{"xyz[2]": [(0, -0.5), (20, -lift), (end, -0.5)]}),
         "vehicle_air_data": states(baro_alt_meter=[(0, 400.0), *((t, 405.0 - baro * z) for t, z in steps[1:])]),
-    })  # fmt: skip
-    return [
-        (one.severity, one.title) for one in every_finding(examine(Px4Flight(log)).findings) if one.kind == "thrust"
-    ]
+    }, parameters={name: (Setting(name, value, "ulog", shipped[name]),) for name, value in parameters.items()})  # fmt: skip
+    return [one for one in every_finding(examine(Px4Flight(log)).findings) if one.kind == "thrust"]
 
 
 @pytest.mark.parametrize(
@@ -48,7 +49,21 @@ def found(lift: float, sinks: float, wanted: float, lasts_s: float, baro: float 
 def test_thrust_at_its_end(
     lift: float, sinks: float, wanted: float, lasts_s: float, told: list[tuple[str, str]]
 ) -> None:
-    assert found(lift, sinks, wanted, lasts_s) == told
+    assert [(one.severity, one.title) for one in found(lift, sinks, wanted, lasts_s)] == told
+
+
+@pytest.mark.parametrize(
+    ("lift", "sinks", "wanted", "name", "value", "default"),
+    [(0.45, -1.5, 1.8, "MPC_THR_MIN", 0.45, 0.12), (0.6, -0.2, -1.5, "MPC_THR_MAX", 0.6, 1.0)],
+)
+def test_an_end_of_the_thrust_that_somebody_set_is_named(
+    lift: float, sinks: float, wanted: float, name: str, value: float, default: float
+) -> None:
+    (one,) = found(lift, sinks, wanted, 8.0, **{name: value})
+    assert (one.suspect, one.parameters, one.wanted) == ("parameter", (name,), ((name, default),))
+    assert one.evidence.endswith(f"{name} is {value:g} (default {default:g})")
+    (near,) = found(0.14, -1.5, 1.8, 8.0, MPC_THR_MIN=0.14)
+    assert near.parameters == ()
 
 
 def test_a_climb_of_the_estimate_alone_is_none() -> None:

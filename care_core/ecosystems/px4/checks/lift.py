@@ -22,6 +22,7 @@ from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
 from care_core.numbers import Floats, median
 from care_core.records import replace
+from care_core.run import shown
 
 _BATTERY = "battery_status"
 _WANTED, _AIR = "vehicle_local_position_setpoint", "vehicle_air_data"
@@ -49,6 +50,8 @@ _DRAWS_W = LIMITS.add("power of a vehicle that lifts", 5.0, "W", "the lightest q
 _MEASURED_A = LIMITS.add("change of a current that is measured", 0.02, "A", "a choice: what is not measured stays")
 _FEWEST = 10
 _UNPOWERED = LIMITS.add("probability that the motors get no power", 0.95, "", "physics: lift takes power")
+_SET = LIMITS.add("probability of an end that is set", 0.9, "", "thrust stands at the very value that somebody set")
+_SET_BY = LIMITS.add("how far an end is set off its default", 0.1, "", "a choice: a tenth of the thrust is felt")
 _TRUE = LIMITS.add("probability of a part", 0.5, "", "a choice: a load, and how outputs are set, look the same")
 
 
@@ -73,9 +76,29 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     flies_off = (lift < least + _NEAR_LEAST) & (wanted - sinks > _OFF_MS) & (sinks < -_RISES_MS)
     lacking = _told(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust")
     drawn_w = drawn_while_lifting(flight)
-    yield from lacking if drawn_w is None else (_unpowered(flight, one, drawn_w) for one in lacking)
+    for one in lacking:
+        yield _set(flight, one, "MPC_THR_MAX", -1.0) if drawn_w is None else _unpowered(flight, one, drawn_w)
     for one in _told(flight, _End(t, flies_off, sinks, wanted), "it rises with the motors at their least", "the least"):
-        yield replace(one, severity="critical" if one.end_s - one.onset_s > _LONG_S else "warning")
+        lasting = replace(one, severity="critical" if one.end_s - one.onset_s > _LONG_S else "warning")
+        yield _set(flight, lasting, "MPC_THR_MIN", 1.0)
+
+
+def _set(flight: Px4Flight, one: Finding, end: str, way: float) -> Finding:
+    """The finding with the parameter that sets this end of the thrust, where it is off its default so that it explains
+    it: the least above it (`way` 1), the most below it (-1)."""
+    setting = flight.off_default(end)
+    if setting is None or not isinstance(setting.value, (int, float)) or not isinstance(setting.default, (int, float)):
+        return one
+    if way * (setting.value - setting.default) < _SET_BY:
+        return one
+    return replace(
+        one,
+        suspect="parameter",
+        evidence=f"{one.evidence}; {end} is {shown(setting.value)} (default {shown(setting.default)})",
+        parameters=(end,),
+        wanted=((end, float(setting.default)),),
+        probability=_SET,
+    )
 
 
 def drawn_while_lifting(flight: Px4Flight) -> float | None:
