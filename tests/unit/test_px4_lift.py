@@ -21,6 +21,7 @@ def found(
 ) -> list[Finding]:
     """Findings of a flight that hovers, and from 20 s on, for a time, is asked for a lift and sinks so fast (m/s)."""
     shipped = {"MPC_THR_MIN": 0.12, "MPC_THR_MAX": 1.0}
+    held = {name: (Setting(name, value, "ulog", shipped[name]),) for name, value in parameters.items()}
     end = 20.0 + lasts_s
     steps = [(0.0, 0.0), *((20.0 + 0.1 * n, sinks * 0.1 * n) for n in range(int(10 * lasts_s)))]
     log = MadeLog({
@@ -30,7 +31,7 @@ def found(
         "vehicle_local_position_setpoint": states(vz=[(0, 0.0), (20, wanted), (end, 0.0)]),
         "vehicle_thrust_setpoint": states(**{"xyz[2]": [(0, -0.5), (20, -lift), (end, -0.5)]}),
         "vehicle_air_data": states(baro_alt_meter=[(0, 400.0), *((t, 405.0 - baro * z) for t, z in steps[1:])]),
-    }, parameters={name: (Setting(name, value, "ulog", shipped[name]),) for name, value in parameters.items()})  # fmt: skip
+    }, parameters=held)  # fmt: skip
     return [one for one in every_finding(examine(Px4Flight(log)).findings) if one.kind == "thrust"]
 
 

@@ -158,3 +158,14 @@ def test_a_refusal_names_the_calibration_that_its_check_reads() -> None:
     (found,) = arming.find(Px4Flight(replace(MadeLog(tables, parameters=off), facts=SIMULATED)))
     assert (found.parameters, found.wanted) == (("CAL_ACC0_ZOFF",), ())
     assert found.evidence.endswith("CAL_ACC0_ZOFF is 1.5 (default 0): calibrate again")
+
+
+def test_a_compass_that_is_left_out_is_named_where_none_is_found() -> None:
+    said = words(
+        (5.0, "critical", "Preflight Fail: Found 0 compass (required: 1)"), (6.0, "critical", "Arming denied: no")
+    )
+    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
+    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=calibrated(CAL_MAG0_PRIO=-1.0))))
+    assert found.parameters == ("CAL_MAG0_PRIO",)
+    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=calibrated(CAL_MAG0_PRIO=100.0))))
+    assert found.parameters == ()

@@ -20,7 +20,7 @@ from care_core.ecosystems.liveness import Frozen, Unconnected
 from care_core.ecosystems.px4 import sources
 from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED, Lean, lean_of
 from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
-from care_core.ecosystems.px4.calibration import usual
+from care_core.ecosystems.px4.calibration import is_calibration, usual
 from care_core.ecosystems.spans import Span, within
 from care_core.ecosystems.vehicles import is_simulated
 from care_core.logs.base import Log, Table, Wanted
@@ -171,10 +171,9 @@ class Px4Flight(RunModel):
         setting = next(iter(self.log.settings().get(name, ())), None)
         if setting is None:
             return None
-        if isinstance(setting.value, (int, float)):
+        if isinstance(setting.value, (int, float)) and is_calibration(name):
             sound = usual(name, float(setting.value), is_simulated=is_simulated(self.log.facts, {}))
-            if sound is not None:
-                return replace(setting, default=sound)
+            return None if sound is None else replace(setting, default=sound)
         return None if setting.default in (None, setting.value) else setting
 
     def killed_s(self, span: Span = (-math.inf, math.inf)) -> float | None:

@@ -40,7 +40,7 @@ _CHECKS = (
     (r"accels? \d* ?inconsistent", "COM_ARM_IMU_ACC"),
     (r"gyros? \d* ?inconsistent", "COM_ARM_IMU_GYR"),
     (r"compass(es)? .*inconsistent", "COM_ARM_MAG_ANG"),
-    (r"found \d+ compass|compass \d+ missing", "SYS_HAS_MAG SENS_EN_MAGSIM"),
+    (r"found \d+ compass|compass \d+ missing", "SYS_HAS_MAG SENS_EN_MAGSIM CAL_MAG0_PRIO CAL_MAG1_PRIO"),
     (r"barometer \d+ missing", "SYS_HAS_BARO SENS_EN_BAROSIM"),
     (r"no valid mission", "COM_ARM_MIS_REQ"),
     (r"takeoff|landing required", "MIS_TKO_LAND_REQ"),
@@ -61,7 +61,7 @@ _CHECKS = (
 
 
 def _named(names: str) -> tuple[str, ...]:
-    return tuple(one for name in names.split() for one in (calibrations(name) if name.startswith("CAL_") else (name,)))
+    return tuple(one for name in names.split() for one in calibrations(name) or (name,))
 
 
 _READ_BY = tuple((re.compile(says, re.IGNORECASE), _named(names)) for says, names in _CHECKS)
