@@ -30,6 +30,7 @@ RELATIONS: Mapping[str, tuple[str, Callable[[float, float], bool]]] = {
     "=": ("must be", operator.eq),
     "!=": ("must not be", operator.ne),
     "within": ("must be within", lambda a, b: abs(a) <= b),
+    "usually": ("is usually within", lambda a, b: abs(a) <= b),  # no check of the firmware
 }
 _NAME = re.compile(r"\b[A-Z][A-Z0-9]*_[A-Z0-9_]*[A-Z0-9]\b")
 

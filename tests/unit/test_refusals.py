@@ -94,6 +94,12 @@ def test_what_must_hold_is_broken_only_where_all_of_it_is_known() -> None:
     assert Must("AHRS_TRIM_X", "within", "0.175").is_broken({"AHRS_TRIM_X": -0.3})
 
 
+def test_a_bound_that_no_check_asks_is_told_as_what_is_usual() -> None:
+    bound = Must("COMPASS_OFS2_Z", "usually", "350")
+    assert bound.is_broken({"COMPASS_OFS2_Z": -575.0})
+    assert bound.asks("COMPASS_OFS2_Z", {"COMPASS_OFS2_Z": -575.0}) == "is usually within 350"
+
+
 Off = tuple[float, float | None]
 """A value and its default; None where the log does not tell it."""
 
