@@ -217,3 +217,12 @@ def test_an_airspeed_that_is_commanded_counts_and_a_ground_speed_does_not(what: 
     columns["CNum"] = np.arange(len(columns["CNum"]), dtype=float)
     flight = mission(CMD=Table(np.zeros(len(columns["CNum"])), columns))
     assert value("mission_asked", flight, what="commanded_speed") == expected
+
+
+def test_a_field_that_an_old_firmware_lacks_is_told_from_a_missing_message() -> None:
+    old = Table(AT, {"Aspd": 19.0 + 0 * AT, "ThrDem": 45.0 + 0 * AT})
+    lacking, absent = value("airspeed", mission(CTUN=old)), value("airspeed", mission(CTUN=Table(AT[:0], {})))
+    assert isinstance(lacking, Unavailable)
+    assert lacking.reason == "no CTUN with As in the log"
+    assert "LOG_BITMASK" not in lacking.hint
+    assert isinstance(absent, Unavailable)

@@ -192,8 +192,11 @@ def on_legs(mission: Mission, channel: str, *fields: str) -> Table | Unavailable
     if isinstance(spans, Unavailable):
         return spans
     table = mission.table(channel)
-    if table is None or not all(field in table.columns for field in fields):
+    if table is None:
         return missing(channel)
+    lacking = [field for field in fields if field not in table.columns]
+    if lacking:
+        return missing(f"{channel} with {' and '.join(lacking)}", "judge a log of a firmware that records it")
     table = next(iter(split(channel, table)), table)
     wanted = np.logical_and.reduce([np.isfinite(table[field]) for field in fields])
     wanted &= during(spans, table.t)
