@@ -67,7 +67,8 @@ _HIT_LOST_S = 10.0
 """What left its demand so shortly before it hit the ground, and was not back since, had lost control."""
 _FAST_MS, _STILL = 5.0, 2.0
 """A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
-_SIMULATED_HIT = re.compile(r"SIM Hit ground at (\d+(?:\.\d+)?) m/s")
+_SIMULATED_HIT = re.compile(r"(?:SIM )?Hit ground at (\d+(?:\.\d+)?) m/s")
+"""Simulators before firmware 4.1 said it without their name."""
 _BEFORE_OVER_S, _ON_SIDE_DEG = 3.0, 50.0
 """Motors that worked so shortly before a copter lay on its back or its side turned it over, or let it fall; no ground
 that a copter stands on is so steep."""
