@@ -445,6 +445,18 @@ def test_a_noisy_barometer(rate_hz: float) -> None:
     assert finding.onset_s == pytest.approx(FAILS_S, abs=6.0)
 
 
+@pytest.mark.parametrize(("noise_m", "kinds"), [(0.05, []), (3.0, ["barometer"])])
+def test_a_copter_that_dives_and_climbs_has_no_noisy_barometer(noise_m: float, kinds: list[str]) -> None:
+    made = Made(rate_hz=5.0)
+    dives = 15.0 * np.sin(2 * np.pi * np.maximum(made.t - 30.0, 0.0) / 8.0) * made.after(30.0, 94.0)
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("CTUN", "DAlt"), ("GPS", "Alt")):
+        made.table[name][field] += dives
+    for name in ("BARO", "BARO#2"):
+        made.table[name]["Alt"] += dives + made.noise(0.1) * np.gradient(dives, made.t)  # sampled up to 0.2 s off
+    made.table["BARO"]["Alt"] += made.noise(noise_m)
+    assert [one.kind for one in every_finding(made.find()) if "record to record" in one.evidence] == kinds
+
+
 def test_a_drifting_barometer_is_told_by_the_second_one() -> None:
     made = Made()
     made.table["BARO"]["Alt"] += np.maximum(made.t - FAILS_S, 0) * 0.2

@@ -45,7 +45,10 @@ _OF_HEIGHT = LIMITS.add(
     "share of a height that it may be off", 0.08, "", "air that is 20 K off the standard atmosphere"
 )
 NOISE_M = LIMITS.add("noise from record to record", 0.5, "m", "three times what a good barometer resolves")
-_APART_S = LIMITS.add("time between records, of a plane", 0.15, "s", "a choice: half of what thinned logs hold")
+_SMOOTH_S = LIMITS.add("time over which noise is averaged", 10.0, "s", "a choice: a gust is over sooner")
+_DIVES_MS = LIMITS.add("dive or climb of a copter that counts", 5.0, "m/s", "twice PILOT_SPEED_UP as shipped")
+_STEADY_S = LIMITS.add("time over which its speed is averaged", 2.0, "s", "a choice: a dive lasts longer")
+_APART_S = LIMITS.add("time between records of what climbs fast", 0.15, "s", "a choice: half of what thinned logs hold")
 _LASTS_S = LIMITS.add("shortest time over a limit", 5.0, "s", "a choice: landing gusts press on it for a second")
 _SEVERE = LIMITS.add("times the limit that cost the height", 2.0, "", "a choice: the vehicle holds its height by it")
 _LOW_M = LIMITS.add("range at which it is compared", 3.0, "m", "a choice: higher, terrain explains a difference")
@@ -181,15 +184,20 @@ def _noise(flight: Flight, t: Floats, height: Floats) -> Floats:
     """Roughness of the height beside what the vehicle's own estimate explains, shape of `height`."""
     known = flight.height
     moved = np.interp(t, *known) if known is not None else np.zeros(len(t))
-    return np.minimum(smooth(t, roughness(height - moved), 10.0), smooth(t, roughness(height), 10.0))
+    return np.minimum(smooth(t, roughness(height - moved), _SMOOTH_S), smooth(t, roughness(height), _SMOOTH_S))
 
 
 def _moved_between(flight: Flight, t: Floats) -> Floats:
-    """How far a plane climbs or sinks between the records of its barometer and of its estimate, shape of `t`."""
+    """How far it climbs or sinks between the records of its barometer and of its estimate, shape of `t`; a copter only
+    where it dives or shoots up, since its estimate follows some of a noisy barometer."""
     known = flight.height
-    if not flight.is_winged or known is None or len(t) < 3:
+    if known is None or len(t) < 3:
         return np.zeros(len(t))
-    return _APART_S * np.abs(np.gradient(np.interp(t, *known), t))
+    height = np.interp(t, *known)
+    if flight.is_winged:
+        return _APART_S * np.abs(np.gradient(height, t))
+    speed = np.abs(np.gradient(smooth(t, height, _STEADY_S), t))
+    return _APART_S * smooth(t, np.where(speed > _DIVES_MS, speed, 0.0), _SMOOTH_S)
 
 
 def _drift(flight: Flight, first: Table) -> Floats | None:
