@@ -750,6 +750,20 @@ def test_a_log_that_ends_in_the_air_and_one_with_a_hole() -> None:
     assert find(flight_of(holed, flight.settings, flight.log.facts, END_S, [JUMP])) == ()  # not by such a clock
 
 
+@pytest.mark.parametrize(("sinks_ms", "titles"), [(12.0, ["the log ends in the air"]), (2.0, [])])
+def test_a_log_that_ends_in_a_fall_below_its_home(sinks_ms: float, titles: list[str]) -> None:
+    made = Made()
+    made.rows["ARM"].pop()
+    falls = made.after(60.0)
+    made.table["CTUN"]["ThO"][falls] = 0.0
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("CTUN", "DAlt"), ("BARO", "Alt"),
+                        ("BARO#2", "Alt"), ("GPS", "Alt")):  # fmt: skip
+        made.table[name][field][falls] -= sinks_ms * (made.t[falls] - 60.0)
+    tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
+    findings = every_finding(find(flight_of(tables, made.known, made.facts, 70.0)))
+    assert [one.title for one in findings if one.kind == "log"] == titles
+
+
 def test_an_overloaded_autopilot() -> None:
     made = Made()
     made.table["PM"]["NLon"][made.after(FAILS_S)] = 1500

@@ -20,6 +20,10 @@ _HOLE_S = LIMITS.add("shortest hole", 2.0, "s", "a choice: a busy card may keep 
 _TIMES = LIMITS.add("shortest hole, in usual steps", 20.0, "", "a choice: of logs that are thinned")
 _SWITCHED_S = LIMITS.add("around arming and disarming", 1.0, "s", "a choice: loggers are opened and closed there")
 _HIGH_M = LIMITS.add("height of an end in the air", 2.0, "m", "a choice: more than any estimate drifts in a flight")
+_FALL_M, _FALLS_S = (
+    LIMITS.add("fall at an end in the air", 10.0, "m", "a choice: a landing sinks 2 m/s at most, and drift less"),
+    LIMITS.add("time of that fall", 2.0, "s", "a choice: longer than a step of the height as it touches down"),
+)
 _LIFTING = LIMITS.add("throttle of an end in the air", 0.2, "", "a choice: armed motors idle below it")
 _FALLS_V = LIMITS.add(
     "fall of the board's supply", 0.3, "V", "ArduPilot, Power module and brown-outs: twice the swing that is normal"
@@ -112,8 +116,9 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
     throttle, height = flight.throttle, flight.height
     if not flight.is_copter or height is None:
         return
-    last_m = float(median(height[1][-3:]))
-    if not last_m > _HIGH_M or not (throttle is None or float(median(throttle[1][-3:])) > _LIFTING):
+    last_m, fell_m = float(median(height[1][-3:])), _fell_m(height)
+    lifts = throttle is None or float(median(throttle[1][-3:])) > _LIFTING
+    if not (last_m > _HIGH_M and lifts) and fell_m < _FALL_M:
         return
     sagging = _supply_falls(flight)
     yield Finding(
@@ -122,11 +127,22 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         onset_s=flight.end_s,
         end_s=flight.end_s,
         severity="critical" if sagging else "warning",
-        evidence=f"armed {last_m:.0f} m up at the last record: "
+        evidence=(
+            f"armed and falling at {fell_m / _FALLS_S:.0f} m/s at the last record: "
+            if fell_m >= _FALL_M
+            else f"armed {last_m:.0f} m up at the last record: "
+        )
         + (sagging or "power was lost or the recording was stopped"),
         source="EV, ARM, CTUN, POS, POWR",
         probability=_POWER_LOST if sagging else _ENDS,
     )
+
+
+def _fell_m(height: tuple[Floats, Floats]) -> float:
+    """How far it came down in the last seconds of the log."""
+    t, known = height
+    before = known[(t <= t[-1] - _FALLS_S) & (t > t[-1] - 2 * _FALLS_S)]
+    return float(before[-1] - median(known[-3:])) if len(before) else 0.0
 
 
 def _supply_falls(flight: Flight) -> str:
