@@ -725,6 +725,31 @@ def test_a_tip_over_at_take_off() -> None:
     assert first(made).kind == "takeoff"
 
 
+@pytest.mark.parametrize(("mode", "suspect"), [(1.0, "operation"), (0.0, "hardware")])
+@pytest.mark.parametrize(
+    ("throttle", "lasts_s", "felt", "turned"),
+    [
+        (0.05, 97.0, 9.8, True),  # on its back until it is disarmed, its motors driven by little: a light vehicle
+        (0.0, 97.0, 9.8, False),  # turned over by hand with its motors at rest
+        (0.05, 2.0, 9.8, False),  # a flip, upright again
+        (0.05, 97.0, 2.0, False),  # upside down in the air: what falls feels little of gravity
+    ],
+)
+def test_a_copter_that_turned_over_and_lay_on_its_back(
+    mode: float, suspect: str, throttle: float, lasts_s: float, felt: float, turned: bool
+) -> None:
+    made = Made()
+    over = made.after(UP_S + 2, UP_S + 2 + lasts_s)
+    made.rows["MODE"] = [(0.0, {"ModeNum": mode})]
+    made.table["POS"]["RelHomeAlt"][:] = made.table["CTUN"]["Alt"][:] = made.table["CTUN"]["BAlt"][:] = 0.1
+    made.table["CTUN"]["ThO"][:] = np.where(made.after(UP_S, UP_S + 3), throttle, 0.0)
+    made.table["ATT"]["Roll"][over] = 168.0
+    made.table["IMU"]["AccZ"][over] = felt
+    crashes = [one for one in every_finding(made.find()) if one.kind == "crash"]
+    assert [(one.title, one.suspect) for one in crashes] == [("it turned over", suspect)] * turned
+    assert made.flight().impact_s == (pytest.approx(UP_S + 2, abs=0.2) if turned else None)
+
+
 def test_a_descent_into_the_ground_by_the_stick_is_no_failure() -> None:
     made = Made()
     made.rows["ERR"] = [(DOWN_S, {"Subsys": 12.0, "ECode": 1.0})]

@@ -53,6 +53,7 @@ _CLIMBS_M = 20.0
 """A copter that has hit the ground cannot climb so far, whatever its estimator reports."""
 _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
+_GRAVITY = 9.81
 _SHOCK, _HARD = 30.0, 5.0
 """m/s^2: three times gravity is no flight, and so many times that is no motor that broke."""
 _STOPS_S, _MOVES_MS, _STOPPED = 0.8, 2.5, 0.3
@@ -72,6 +73,8 @@ _SIMULATED_HIT = re.compile(r"(?:SIM )?Hit ground at (\d+(?:\.\d+)?) m/s")
 _BEFORE_OVER_S, _ON_SIDE_DEG = 3.0, 50.0
 """Motors that worked so shortly before a copter lay on its back or its side turned it over, or let it fall; no ground
 that a copter stands on is so steep."""
+_LIES_S, _TURNS = 3.0, 0.02
+"""A flip is over sooner; above this throttle motors do more than idle, however light the vehicle."""
 _FLEW_S = 5.0
 """What lies on its side fell so shortly after it flew; later it lay where it had come down, its motors up or not."""
 _SPINS_DEG_S, _HALF_TURN_DEG = 400.0, 180.0
@@ -255,6 +258,30 @@ class Airborne(Armed):
         start = over[-1][0]
         return start if self._is_driven(t[(t > start - _BEFORE_OVER_S) & (t <= start)]).any() else None
 
+    @cached_property
+    def turned_over_s(self) -> float | None:
+        """When an upright copter with working motors turned over and then lay on its back, at rest, until it was
+        disarmed; in acro as well, since what is upside down in the air falls and feels less than gravity."""
+        table, leans, driven = self.one("IMU", "AccX", "AccY", "AccZ"), self.tilt, self.throttle
+        if table is None or leans is None or driven is None or not self.is_copter:
+            return None
+        t, tilt = leans
+        felt = np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
+        for armed_s, disarmed_s in self.armed:
+            armed = (t >= armed_s) & (t <= disarmed_s)
+            for start, end in runs(t, (tilt > UPSIDE_DOWN_DEG) & armed, gap_s=_STRUCK_S):
+                if end - start < _LIES_S or end < disarmed_s - _STRUCK_S:
+                    continue
+                since = max(start - _BEFORE_OVER_S, armed_s)
+                before = tilt[(t >= since) & (t < start)]
+                throttle = driven[1][(driven[0] >= since) & (driven[0] <= start)]
+                last = felt[(table.t > end - _LIES_S + _STRUCK_S) & (table.t <= end)]
+                is_at_rest = len(last) > 2 and float(np.max(np.abs(last - _GRAVITY))) < _STILL
+                was_upright = float(np.min(before, initial=UPSIDE_DOWN_DEG)) < _ON_SIDE_DEG
+                if is_at_rest and was_upright and float(np.max(throttle, initial=0.0)) > _TURNS:
+                    return start
+        return None
+
     @property
     def _spun_s(self) -> float | None:
         """When a copter whose motors worked turned over faster than its attitude, ten times a second, can tell."""
@@ -382,7 +409,7 @@ class Airborne(Armed):
     def impact_s(self) -> float | None:
         """When it hit something, or its firmware found it crashed; None where neither happened."""
         hits = () if self.hit is None else (self.hit.time_s,)
-        return min((t for t in (*hits, self._impact_of_lost_s) if t is not None), default=None)
+        return min((t for t in (*hits, self._impact_of_lost_s, self.turned_over_s) if t is not None), default=None)
 
     @property
     def ending_hit(self) -> Hit | None:

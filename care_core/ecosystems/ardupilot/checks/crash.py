@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.airborne import ACRO
 from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
@@ -25,6 +26,7 @@ _ANSWERS_S = LIMITS.add("time in which a mode acts on the throttle", 0.5, "s", "
 _FALL_S = LIMITS.add("fall that may have begun in another mode", 2.0, "s", "free fall: 20 m")
 _SINKS_M = LIMITS.add("descent in the second before a mode that is a fall", 0.5, "m", "a choice: a landing is as fast")
 _TIPPED = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a choice: order, direction or propellers")
+_BY_STICKS = LIMITS.add("probability that the sticks turned it over", 0.5, "", "a choice: in acro they do, or a part")
 _CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
 _STEERED = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
 _STRANDED = LIMITS.add("probability of what could not rise", 0.0, "", "it says that the run failed, and nothing of why")
@@ -58,27 +60,31 @@ def find(flight: Flight) -> Iterator[Finding]:
         )
     elif told is not None or said is not None or impact is not None:
         first = min(t for t in (told, said, impact, flight.struck_s) if t is not None)
-        undriven = _undriven(flight, first)
-        steered = "" if undriven else _steered(flight, first)
         is_said = told is not None or said is not None
+        over = lost is None and not is_said and first == flight.turned_over_s
+        undriven = not over and _undriven(flight, first)
+        steered = "" if undriven else _steered(flight, first)
+        by_sticks = over and int(flight.modes_at(np.array([first]))[0]) in ACRO
         shown = (
             "the firmware says: crash" if is_said else "control was lost, and it came down" if lost is not None else "",
             "" if flight.ending_hit is None else flight.ending_hit.said,
             steered,
+            "it went over with its motors turning, and lay on its back until it was disarmed" if over else "",
+            "the sticks tell how fast it turns in this mode" if by_sticks else "",
             "no throttle was given since it was armed: does it estimate its attitude rightly?" if undriven else "",
             "a blow came before control was lost" if flight.blow_s is not None else "",
             "it turned over and did not fall: it lies on what it hit" if flight.is_caught else "",
         )
         yield Finding(
             kind="crash",
-            title=UNDRIVEN if undriven else _what(flight, steered),
+            title=UNDRIVEN if undriven else "it turned over" if over else _what(flight, steered),
             onset_s=first,
             end_s=first,
             severity="critical",
             evidence="; ".join(filter(None, shown)),
             source="ERR 12, MSG, ATT, IMU, height",
-            suspect="operation" if steered else "hardware",
-            probability=_STEERED if steered else _CRASHED,
+            suspect="operation" if steered or by_sticks else "hardware",
+            probability=_STEERED if steered else _BY_STICKS if by_sticks else _CRASHED,
         )
 
 

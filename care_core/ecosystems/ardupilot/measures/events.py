@@ -118,9 +118,10 @@ def crash_of(mission: Mission) -> str:
         return "the autopilot reported a crash"
     if (hit := hit_of(mission)) is not None:
         return f"it hit {hit.what} at {hit.speed_ms:.1f} m/s"
-    impact_s = flight_of(mission).impact_s
-    is_own = impact_s is not None and mission.start_s <= impact_s <= mission.end_s + SAID_AFTER_S
-    return "control was lost, and it came down" if is_own else ""
+    flight = flight_of(mission)
+    if flight.impact_s is None or not mission.start_s <= flight.impact_s <= mission.end_s + SAID_AFTER_S:
+        return ""
+    return "it turned over" if flight.impact_s == flight.turned_over_s else "control was lost, and it came down"
 
 
 def hit_of(mission: Mission) -> Hit | None:
