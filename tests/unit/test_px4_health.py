@@ -397,6 +397,29 @@ def test_a_battery_that_runs_down_in_the_air_is_told_and_one_with_fewer_cells_th
     assert flown(11.6, 9.9, 3) == [("the battery has fewer cells than are set", "warning")]
 
 
+@pytest.mark.parametrize(
+    ("least_v", "after_v", "ampere", "title"),
+    [
+        (14.8, 15.6, 0.0, "the battery was told to be empty, and was not"),
+        (14.8, 15.0, 0.0, "the battery ran down to its emergency level"),
+        (13.2, 15.6, 20.0, "the battery ran down to its emergency level"),  # it sags as no sound one does
+    ],
+)
+def test_a_battery_whose_gauge_says_empty(least_v: float, after_v: float, ampere: float, title: str) -> None:
+    log = MadeLog({
+        "vehicle_status": FLOWN,
+        "vehicle_local_position": states(z=[(0, 0.0), (20, -10.0), (48, 0.0)]),
+        "battery_status": states(voltage_v=[(0, 16.0), (30, least_v), (50, after_v)],
+                                 current_a=[(0, 0.0), (19, ampere), (50, 0.0)],
+                                 remaining=[(0, 0.6)], warning=[(0, 0), (30, 3)]),
+    }, parameters={name: (Setting(name, value, "PX4 parameters"),)
+                   for name, value in (("BAT1_N_CELLS", 4.0), ("BAT1_V_EMPTY", 3.8))})  # fmt: skip
+    found = [one for one in examine(Px4Flight(log)).findings if one.kind == "battery"]
+    assert [one.title for one in found] == [title]
+    assert ("no current tells" in found[0].evidence) is ("was not" in title)
+    assert found[0].parameters == (("BAT1_V_EMPTY",) if "was not" in title else ())
+
+
 def test_a_battery_that_keeps_it_from_arming_is_the_battery() -> None:
     health = examine(Px4Flight(MadeLog({
         "vehicle_status": states(arming_state=[(0, 1)], nav_state=[(0, 4)]),

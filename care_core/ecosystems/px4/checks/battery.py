@@ -1,5 +1,5 @@
-"""A battery that was not charged, one whose voltage falls under load as no sound one's does, one that ran down, and
-one that has fewer cells than are set."""
+"""A battery that was not charged, one whose voltage falls under load as no sound one's does, one that ran down, one
+that was told to be empty and was not, and one that has fewer cells than are set."""
 
 from __future__ import annotations
 
@@ -39,8 +39,14 @@ _PER_CELL = (LIMITS.add("least voltage of a cell that is", 3.5, "V", "an empty l
 _CELLS = LIMITS.add("probability of a wrong number of cells", 0.7, "", "a choice: they may all be dead")
 _CELLS_LOSE = LIMITS.add("probability that it loses a mission", 0.05, "", "a choice: failsafes act too soon or late")
 _BEGINS_S = LIMITS.add("time in which a log that begins armed tells of rest", 5.0, "s", "a choice: before it lifts")
-_EMERGENCY = 3
+_HALF_V = LIMITS.add(
+    "voltage of a cell at rest that is half full", 3.8, "V", "discharge curves of lithium polymer cells"
+)
+_LOADED_V = LIMITS.add("voltage of a cell under load that is sound", 3.5, "V", "BAT1_V_EMPTY as shipped before 1.14")
+_TOLD_LOW = LIMITS.add("probability that its charge was told too low", 0.9, "", "its voltage at rest says so")
+_CRITICAL, _EMERGENCY = 2, 3
 """battery_status.warning."""
+_EMPTY_AT = ("BAT1_V_EMPTY", "BAT_V_EMPTY")
 _CELLS_SET = ("BAT1_N_CELLS", "BAT_N_CELLS")
 _FEWEST = 3
 
@@ -49,8 +55,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     table = flight.table(_TOPIC, "voltage_v", "current_a", "remaining")
     if table is None:
         return
-    few = next(_fewer_cells(flight, table), None)
-    yield from (few,) if few is not None else _ran_down(flight)
+    wrong = next(iter((*_fewer_cells(flight, table), *_told_low(flight))), None)
+    yield from (wrong,) if wrong is not None else _ran_down(flight)
     if not flight.arming:
         return
     armed_s, end_s = flight.armed[0] if flight.armed else (flight.end_s, flight.end_s)
@@ -106,6 +112,39 @@ def _cells_set(flight: Px4Flight) -> tuple[str, int]:
     """The parameter that tells how many cells there are, and how many it tells; none where no parameter does."""
     told = ((name, code(flight.log.settings(), name)) for name in _CELLS_SET)
     return next(((name, cells) for name, cells in told if cells), ("", 0))
+
+
+def _told_low(flight: Px4Flight) -> Iterator[Finding]:
+    """By its voltage at rest, once disarmed, where it was all but empty in the air by what the firmware told."""
+    table, (_, cells) = flight.table(_TOPIC, "voltage_v", "current_a", "warning"), _cells_set(flight)
+    if table is None or not cells or not flight.aloft:
+        return
+    begin, end = flight.aloft[0][0], flight.aloft[-1][1]
+    warned = table.t[(table["warning"] >= _CRITICAL) & (table.t >= begin) & (table.t <= end)]
+    rest = table.where((table.t >= flight.armed[-1][1]) & (table["current_a"] < _LEAST_A))
+    if not len(warned) or len(rest) < _FEWEST:
+        return
+    flown = table.between(begin, end)
+    rest_v, least_v = float(median(rest["voltage_v"])) / cells, float(np.min(flown["voltage_v"])) / cells
+    if rest_v <= _HALF_V or least_v < _LOADED_V:
+        return
+    name = next((one for one in _EMPTY_AT if one in flight.log.settings()), "")
+    yield Finding(
+        kind="battery",
+        title="the battery was told to be empty, and was not",
+        onset_s=float(warned[0]),
+        end_s=end,
+        severity="critical",
+        evidence=(
+            f"{least_v:.2f} V a cell at the least in the air, {rest_v:.2f} V at rest once disarmed: more than half full"
+            + (f"; {name} is {flight.log.settings()[name][-1].value:g} V a cell" if name else "")
+            + ("" if float(np.max(flown["current_a"])) > _LEAST_A else ", and no current tells what the load takes")
+        ),
+        source=f"{_TOPIC}.voltage_v, current_a, warning; {name}",
+        suspect="parameter",
+        probability=_TOLD_LOW,
+        parameters=(name,) if name else (),
+    )
 
 
 def _ran_down(flight: Px4Flight) -> Iterator[Finding]:
@@ -184,7 +223,7 @@ def _worn(before: Table, loaded: Table, cells: int, span: Span) -> Iterator[Find
 
 CHECK = Check(
     "battery",
-    "a battery that was not charged, sags under load, ran down in the air or has fewer cells than are set",
+    "a battery that was not charged, sags under load, ran down, was told empty or has fewer cells than are set",
     READS,
     LIMITS,
     find,
