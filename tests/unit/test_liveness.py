@@ -216,7 +216,9 @@ def test_a_path_by_a_frozen_receiver_is_none() -> None:
 # PX4
 
 
-def px4(name: str = "", valid: float | None = None, ends: tuple[str, float] = ("", 100.0)) -> tuple[Finding, ...]:
+def px4(
+    name: str = "", valid: float | None = None, ends: tuple[str, float] = ("", 100.0), **facts: str
+) -> tuple[Finding, ...]:
     rng, t = np.random.default_rng(0), np.arange(0.0, 100.0, 0.1)
 
     def noise(size: float) -> Any:
@@ -248,8 +250,7 @@ def px4(name: str = "", valid: float | None = None, ends: tuple[str, float] = ("
     made = {one: Table(t, columns) for one, columns in tables.items()}
     if ends[0]:
         made[ends[0]] = made[ends[0]].between(0.0, ends[1])
-    log = TablesLog(made, 100.0, formats.PX4_ULG,
-                    {"vehicle": "multicopter"})  # fmt: skip
+    log = TablesLog(made, 100.0, formats.PX4_ULG, {"vehicle": "multicopter", **facts})
     return examine(run_model(log)).findings
 
 
@@ -267,6 +268,10 @@ def px4(name: str = "", valid: float | None = None, ends: tuple[str, float] = ("
 )
 def test_a_source_that_freezes_on_px4_is_named(topic: str, title: str) -> None:
     assert [one.onset_s for one in frozen(px4(topic)) if one.title == title] == [pytest.approx(40.0, abs=0.2)]
+
+
+def test_a_simulators_battery_that_is_discharged_no_further_is_no_dead_monitor() -> None:
+    assert not frozen(px4("battery_status", stack="PX4", hardware="PX4_SITL"))
 
 
 @pytest.mark.parametrize(("valid", "titles"), [(1.0, ["the estimated position is frozen"]), (0.0, [])])

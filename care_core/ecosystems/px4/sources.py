@@ -26,6 +26,7 @@ from care_core.ecosystems.liveness import (
     turned,
 )
 from care_core.ecosystems.spans import Span, inside
+from care_core.ecosystems.vehicles import is_simulated
 from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import Floats
@@ -99,6 +100,8 @@ READS: Wanted = merge_needs((
 def frozen(model: RunModel, moving: Sequence[Span]) -> Iterator[Frozen]:
     """Every stretch in which a source says the same while others tell that the vehicle moved, in spans aloft."""
     tables = model.tables(READS)
+    if is_simulated(model.log.facts, {}):  # its battery is discharged to SIM_BAT_MIN_PCT and no further
+        tables = {name: table for name, table in tables.items() if name != _BATTERY}
     for source in (one for one in SOURCES if one.message in tables):
         table = _known(tables[source.message], source)
         fields = [field for field in source.fields if field in table.columns]
