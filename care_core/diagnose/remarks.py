@@ -15,7 +15,7 @@ from care_core.diagnose.worth import by_chance
 
 def reference_of(judged: Judged) -> str:
     """Whose configuration the run was judged against, and how far from it it was driven."""
-    off, known = len(deviating(judged.run.config, judged.reference.config)), len(judged.reference.config)
+    off, known = len(deviating(judged.run.config, judged.reference.config)), len(judged.run.config)
     count = f"{off} of the profile's {known} parameters differ{'s' * (off == 1)}"
     return f"compared with {judged.reference.source}; {count}"
 
