@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
+from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.checks import arming, calibration, rotors
 from care_core.ecosystems.px4.flight import MESSAGES, STATUS, Px4Flight
 from care_core.ecosystems.px4.preflight import read_by
@@ -13,6 +14,7 @@ from care_core.records import replace
 from care_core.run import Setting
 from tests.unit.test_px4_health import FLOWN, MadeLog, states, words
 
+SIMULATED = {"stack": "PX4", "firmware": "PX4 v1.15.4 (99c40407)", "vehicle": "multicopter", "hardware": "PX4_SITL"}
 PLACES = ((1.0, 1.0, 0.05), (-1.0, -1.0, 0.05), (1.0, -1.0, -0.05), (-1.0, 1.0, -0.05))
 """North, east and turn of the rotors of a quad X."""
 
@@ -29,6 +31,18 @@ def quad(**changed: float) -> dict[str, tuple[Setting, ...]]:
 
 def flight(parameters: Mapping[str, tuple[Setting, ...]]) -> Px4Flight:
     return Px4Flight(MadeLog({STATUS: FLOWN}, parameters=parameters))
+
+
+def refused(reason: str, parameters: Mapping[str, tuple[Setting, ...]], *, is_simulated: bool = False) -> Finding:
+    """What is found of a vehicle that a preflight check kept from arming."""
+    said = words(
+        (5.0, "critical", f"Preflight Fail: {reason}"),
+        (6.0, "critical", "Arming denied: Resolve system health failures first"),
+    )
+    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
+    log = MadeLog(tables, parameters=parameters)
+    (found,) = arming.find(Px4Flight(replace(log, facts=SIMULATED) if is_simulated else log))
+    return found
 
 
 def test_a_frame_that_balances_says_nothing() -> None:
@@ -63,28 +77,17 @@ def test_a_motor_that_no_output_drives_is_named() -> None:
 
 
 def test_a_check_that_refuses_names_what_it_reads_where_that_is_off() -> None:
-    said = words(
-        (5.0, "critical", "Preflight Fail: Parachute system missing"),
-        (6.0, "critical", "Arming denied: Resolve system health failures first"),
-    )
-    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
-    off = {"COM_PARACHUTE": (Setting("COM_PARACHUTE", 1.0, "ulog", 0.0),)}
-    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=off)))
+    said = "Parachute system missing"
+    found = refused(said, {"COM_PARACHUTE": (Setting("COM_PARACHUTE", 1.0, "ulog", 0.0),)})
     assert (found.parameters, found.wanted) == (("COM_PARACHUTE",), ())  # a protection is not made looser
     assert found.evidence.endswith("COM_PARACHUTE is 1 (default 0): check it first")
-    as_shipped = {"COM_PARACHUTE": (Setting("COM_PARACHUTE", 1.0, "ulog", 1.0),)}
-    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=as_shipped)))
+    found = refused(said, {"COM_PARACHUTE": (Setting("COM_PARACHUTE", 1.0, "ulog", 1.0),)})  # as shipped
     assert (found.parameters, found.suspect) == ((), "operation")
 
 
 def test_what_is_wired_is_put_back_where_a_check_refuses_for_it() -> None:
-    said = words(
-        (5.0, "critical", "Preflight Fail: Found 1 compass (required: 4)"),
-        (6.0, "critical", "Arming denied: Resolve system health failures first"),
-    )
-    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
     off = {"SYS_HAS_MAG": (Setting("SYS_HAS_MAG", 4.0, "ulog", 1.0),)}
-    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=off)))
+    found = refused("Found 1 compass (required: 4)", off)
     assert found.wanted == (("SYS_HAS_MAG", 1.0),)
     assert found.evidence.endswith("SYS_HAS_MAG is 4 (default 1): 'param set SYS_HAS_MAG 1' puts it back")
 
@@ -115,9 +118,6 @@ def test_more_rotors_than_outputs_are_as_many_as_the_airframe_has() -> None:
     (found,) = rotors.find(flight(quad(CA_ROTOR_COUNT=6.0)))
     assert found.wanted == (("CA_ROTOR_COUNT", 4.0),)
     assert found.evidence.startswith("4 of 6 are driven")
-
-
-SIMULATED = {"stack": "PX4", "firmware": "PX4 v1.15.4 (99c40407)", "vehicle": "multicopter", "hardware": "PX4_SITL"}
 
 
 def calibrated(**values: float) -> dict[str, tuple[Setting, ...]]:
@@ -152,20 +152,12 @@ def test_what_real_sensors_need_and_the_calibration_of_none_are_not_doubted() ->
 
 
 def test_a_refusal_names_the_calibration_that_its_check_reads() -> None:
-    said = words((5.0, "critical", "Preflight Fail: velocity estimate error"), (6.0, "critical", "Arming denied: no"))
-    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
-    off = calibrated(CAL_ACC0_ZOFF=1.5)
-    (found,) = arming.find(Px4Flight(replace(MadeLog(tables, parameters=off), facts=SIMULATED)))
+    found = refused("velocity estimate error", calibrated(CAL_ACC0_ZOFF=1.5), is_simulated=True)
     assert (found.parameters, found.wanted) == (("CAL_ACC0_ZOFF",), ())
     assert found.evidence.endswith("CAL_ACC0_ZOFF is 1.5 (default 0): calibrate again")
 
 
 def test_a_compass_that_is_left_out_is_named_where_none_is_found() -> None:
-    said = words(
-        (5.0, "critical", "Preflight Fail: Found 0 compass (required: 1)"), (6.0, "critical", "Arming denied: no")
-    )
-    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
-    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=calibrated(CAL_MAG0_PRIO=-1.0))))
-    assert found.parameters == ("CAL_MAG0_PRIO",)
-    (found,) = arming.find(Px4Flight(MadeLog(tables, parameters=calibrated(CAL_MAG0_PRIO=100.0))))
-    assert found.parameters == ()
+    said = "Found 0 compass (required: 1)"
+    assert refused(said, calibrated(CAL_MAG0_PRIO=-1.0)).parameters == ("CAL_MAG0_PRIO",)
+    assert refused(said, calibrated(CAL_MAG0_PRIO=100.0)).parameters == ()
