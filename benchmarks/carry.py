@@ -37,7 +37,7 @@ from care_core.learn.skill import all_met, calibration_error
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
 from care_core.learn.train import summaries
-from care_core.learn.transfer import carry_over
+from care_core.learn.transfer import transfer_to
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, load_profile
@@ -97,7 +97,7 @@ def carried(source: Model, schema: Schema, rows: pd.DataFrame) -> Model:
     """The source as `care update` carries it to a vehicle with a few runs."""
     if rows.empty:
         return source
-    outcomes, mechanisms = carry_over(source, schema, rows, source.graph, np.random.default_rng(0))
+    outcomes, mechanisms = transfer_to(source, schema, rows, source.graph, np.random.default_rng(0))
     return Model(
         schema_digest=source.schema_digest, graph=source.graph, edges={}, bidirected=(), effects={}, paths={},
         outcomes=outcomes, summaries=source.summaries, skill={}, training=source.training, mechanisms=mechanisms,

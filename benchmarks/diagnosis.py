@@ -22,6 +22,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from benchmarks.peers import PlainClassifier, largest_deviation
 from care_core.causal.abduction import ErrorCovariance, next_passes
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.graph import CausalGraph
@@ -33,7 +34,7 @@ from care_core.diagnose.reference import profile_config
 from care_core.diagnose.triage import triage
 from care_core.ecosystems.registry import run_model
 from care_core.extract.select import choose_profile
-from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
+from care_core.learn.bug_isolation import cooperative_bug_isolation
 from care_core.learn.skill import all_met, calibration_error, held_out_probabilities, reliability
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table

@@ -35,11 +35,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from benchmarks.peers import PlainClassifier, largest_deviation
 from care_core.collect.campaign import Campaign, parameter_file_names, read_campaign
 from care_core.collect.mission import command_words, write_parameters
 from care_core.collect.sampling import Planned, points, run_seed
 from care_core.errors import ExitCode
-from care_core.learn.baselines import PlainClassifier, largest_deviation
 from care_core.learn.skill import all_met
 from care_core.learn.table import read_table
 from care_core.logs.finding import logs_below

@@ -27,12 +27,12 @@ import pandas as pd
 from joblib import Parallel, delayed
 
 from benchmarks.diagnosis import abducted
+from benchmarks.peers import PlainClassifier
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model
 from care_core.diagnose.advice import MIN_PROBABILITY
 from care_core.diagnose.ranking import deviating, suspects
 from care_core.diagnose.reference import profile_config
-from care_core.learn.baselines import PlainClassifier
 from care_core.learn.outcomes import met
 from care_core.learn.train import TrainSettings, train
 from care_core.numbers import Floats

@@ -27,7 +27,7 @@ from care_core.learn.fitting import METRIC, OUTCOME, fit_mechanism
 from care_core.learn.outcomes import inputs_of
 from care_core.learn.screening import screen_options
 from care_core.learn.table import normal_scores, read_table
-from care_core.learn.transfer import carry_over, out_of_support
+from care_core.learn.transfer import out_of_support, transfer_to
 from care_core.numbers import Floats
 from care_core.profile.store import Profile, load_profile
 
@@ -128,7 +128,7 @@ def _carried(profile: Profile, train: pd.DataFrame, seed: int) -> Mapping[str, M
         return profile.model.mechanisms
     schema, source = profile.schema, profile.model
     graph = complete(train, schema, source.graph, screen_options(train, schema).kept).graph
-    return carry_over(source, schema, train, graph, np.random.default_rng(seed), only=tuple(MECHANISM.values()))[1]
+    return transfer_to(source, schema, train, graph, np.random.default_rng(seed), only=tuple(MECHANISM.values()))[1]
 
 
 def _error(mechanism: Mechanism, test: pd.DataFrame, name: str) -> float:

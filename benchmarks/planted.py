@@ -29,12 +29,12 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
+from benchmarks.peers import PlainClassifier
 from care_core.causal.model import Model
 from care_core.diagnose.judging import judge, query_of
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Cause, Diagnosis
 from care_core.diagnose.triage import diagnose
-from care_core.learn.baselines import PlainClassifier
 from care_core.learn.train import TrainSettings, train
 from care_core.numbers import Floats
 from care_core.profile.model import write_model

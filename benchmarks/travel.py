@@ -26,6 +26,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
+from benchmarks.peers import PlainClassifier
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Training
 from care_core.diagnose.judging import Judged, query_of, read_and_judge
@@ -34,7 +35,6 @@ from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import triage
 from care_core.ecosystems.registry import run_model
 from care_core.extract.select import choose_profile
-from care_core.learn.baselines import PlainClassifier
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together
 from care_core.learn.relative import missions_of, needs, relative

@@ -114,7 +114,7 @@ def gathered(evidence: Iterable[Evidence]) -> tuple[Evidence, ...]:
     )
 
 
-class Check(Record):
+class OutcomeCheck(Record):
     """A plain question to a run that no limit judges: did it take off, did it land. 1 is yes and well, 0 is no."""
 
     name: str
@@ -244,7 +244,7 @@ class Run(Record):
     evidence: tuple[Evidence, ...] = ()
     changes: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
     """Per parameter that changed during the mission: the value it began with, and each later one until its end."""
-    checks: tuple[Check, ...] = ()
+    checks: tuple[OutcomeCheck, ...] = ()
     """What a run is judged by that flew no mission, or that no profile fits; empty where a profile judges it."""
     modes: tuple[str, ...] = ()
     """The modes that were in force during the mission; empty where the log does not say."""
@@ -263,7 +263,7 @@ class Run(Record):
         parts: tuple[Mapping[str, Value], ...] = (self.config, self.context, self.metrics, self.objectives)
         return next((part[name] for part in parts if name in part), None)
 
-    def hearing(self, *others: Evidence) -> Run:
+    def with_evidence(self, *others: Evidence) -> Run:
         """The run with more that speaks about its failure, all of it in order of time."""
         return replace(self, evidence=tuple(sorted((*self.evidence, *others), key=lambda one: one.time_s)))
 

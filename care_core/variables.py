@@ -246,15 +246,6 @@ class Variable(Record):
         words = {**_WORDS, **{label.casefold(): code for code, label in self.labels}}
         return words.get(text.strip().casefold())
 
-    def typed(self, text: str) -> float | None:
-        """What somebody typed as a value: a label, true or false, or a finite number; None where it is none."""
-        code = self.code_of(text)
-        try:
-            value = float(text) if code is None else code
-        except ValueError:
-            return None
-        return value if math.isfinite(value) else None
-
     def snap(self, value: float) -> float:
         """The nearest acceptable value of the option's type, floats to four significant digits."""
         if self.labels:

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from care_core.run import ProfileChoice, Robot, Setting, Settings
     from care_core.variables import Variable
 
-NOTHING: Settings = MappingProxyType({})
-"""Is told the step and the share that is done, 0 to 1."""
+NO_SETTINGS: Settings = MappingProxyType({})
+"""Where the operator says nothing of the configuration."""
 
 
 class Request(Record):
@@ -158,7 +158,7 @@ def read_case(request: Request, progress: Progress) -> Reading:
 def _said_alone(model: RunModel) -> Settings:
     """What messages say that the robot is put together from, where its parameters in the log do not tell all of it."""
     said = model.plugins()
-    return NOTHING if said.keys() <= model.log.settings().keys() else said
+    return NO_SETTINGS if said.keys() <= model.log.settings().keys() else said
 
 
 def _model_of(log: Log, profile: Profile | None, configs: Sequence[ConfigFile]) -> RunModel:
@@ -202,7 +202,7 @@ def opened(path: Path, progress: Progress | None = None) -> Iterator[tuple[Log, 
 
 
 def choose(
-    log: Log, name: str | None = None, configs: Sequence[ConfigFile] = (), said: Settings = NOTHING
+    log: Log, name: str | None = None, configs: Sequence[ConfigFile] = (), said: Settings = NO_SETTINGS
 ) -> tuple[Profile | None, ProfileChoice]:
     """The installed profile that fits a log best, by the names that the robot has, None where none fits; or how
     the one that was named does.
@@ -224,7 +224,7 @@ def choose(
 
 
 def fitting(
-    log: Log, name: str | None = None, configs: Sequence[ConfigFile] = (), said: Settings = NOTHING
+    log: Log, name: str | None = None, configs: Sequence[ConfigFile] = (), said: Settings = NO_SETTINGS
 ) -> tuple[Profile, ProfileChoice]:
     """As `choose`, for those who can do nothing without a profile: raises ProfileError where none fits."""
     from care_core.extract.select import fitting_profile

@@ -9,7 +9,7 @@ where the model without the one and the model without the other predict most dif
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -150,12 +150,3 @@ def _fitted(runs: Floats, scores: Floats) -> _Process:
         warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound is what is wanted
         regressor.fit(runs[known], scores[known])
     return _Process(regressor, float(regressor.kernel_.k2.noise_level))
-
-
-def rounds(count: int, first: int, batch: int) -> Iterator[int]:
-    """How many runs each round has: the first is spread over the ranges, the others are chosen."""
-    yield min(first, count)
-    left = count - first
-    while left > 0:
-        yield min(batch, left)
-        left -= batch

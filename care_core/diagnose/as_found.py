@@ -11,7 +11,7 @@ from collections.abc import Collection, Sequence
 from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.logs.formats import format_named
 from care_core.records import replace
-from care_core.run import Check, Run, Unavailable, is_known
+from care_core.run import OutcomeCheck, Run, Unavailable, is_known
 from care_core.text import log_time
 
 DOWN: frozenset[FindingKind] = frozenset(("crash", "takeoff"))
@@ -62,7 +62,7 @@ def _crash_of(run: Run, findings: Sequence[Finding]) -> Finding | None:
     return min(during, key=lambda one: one.onset_s, default=None)
 
 
-def _contradicted(check: Check, title: str, how: str) -> Check:
+def _contradicted(check: OutcomeCheck, title: str, how: str) -> OutcomeCheck:
     if check.name in _FAILED and check.value == 1.0:
         return replace(check, value=0.0, otherwise=how)
     if check.name == "landed" and is_known(check.value):

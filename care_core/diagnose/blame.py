@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.diagnose.hypotheses import failure_of, speaking
+from care_core.diagnose.hypotheses import evidence_of_findings, failure_of
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.noisy_or import NoisyOr
 from care_core.diagnose.outside import suspects_outside
@@ -47,8 +47,8 @@ def blame(
 ) -> Blame:
     """The causes of a run that missed an objective. `good`: the parameters of the last good run, where one is known."""
     schema, broken = profile.schema, judged.broken
-    said = speaking(health.findings, schema, judged.run.config)
-    run = judged.run.hearing(*said.values())
+    said = evidence_of_findings(health.findings, schema, judged.run.config)
+    run = judged.run.with_evidence(*said.values())
     found = {
         result.variable.name: suspects(query, result.variable.name, schema.known, run.evidence) for result in broken
     }

@@ -62,7 +62,9 @@ NONE_OUTSIDE: Mapping[str, float] = MappingProxyType({})
 _WHAT: Mapping[SuspectKind, What] = {"hardware": "hardware", "world": "world", "operation": "world"}
 
 
-def speaking(findings: Iterable[Finding], schema: Schema, config: Mapping[str, float]) -> dict[str, Evidence]:
+def evidence_of_findings(
+    findings: Iterable[Finding], schema: Schema, config: Mapping[str, float]
+) -> dict[str, Evidence]:
     """By its title, what each finding that speaks of how the robot was set says of the options that the profile's rules
     read out of it; those of which they read none are left out."""
     said = {}
@@ -89,7 +91,7 @@ def failure_of(
     Args:
         found: per objective the options that may have moved it, with their weights.
         refused: options that the check reads which refused this mission: they explain it whole.
-        shown: by title, the findings that say which options they speak of (`speaking`).
+        shown: by title, the findings that say which options they speak of (`evidence_of_findings`).
         outside: how likely each parameter outside the profile is wrong and loses a mission in this way.
         untold: share of the options whose value is not known.
     """
@@ -141,7 +143,7 @@ def used_up(findings: Iterable[Finding]) -> bool:
     return all(one.title in (BATTERY_FAILSAFE, SAGS) for one in findings if one.severity == "critical")
 
 
-def unasked(
+def hypotheses_without_model(
     findings: Sequence[Finding],
     *,
     missed: Sequence[ObjectiveResult] = (),
@@ -150,7 +152,7 @@ def unasked(
     outside: Mapping[str, float] = NONE_OUTSIDE,
 ) -> tuple[Hypothesis, ...]:
     """What explains a failure of which no model can be asked; empty where nothing failed, by a check of the run
-    (`missed`) or by a critical finding. Options are those that such a finding names (`shown`, as for `explain`)."""
+    (`missed`) or by a critical finding. Options are those that such a finding names (`shown`, as for `failure_of`)."""
     critical = [finding for finding in findings if finding.severity == "critical"]
     if not missed and not critical:
         return ()

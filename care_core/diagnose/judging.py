@@ -22,7 +22,7 @@ from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import Record, field, replace
-from care_core.run import Check, Run, Setting, Unavailable, Value, is_known
+from care_core.run import OutcomeCheck, Run, Setting, Unavailable, Value, is_known
 from care_core.text import log_time
 from care_core.variables import Role, Threshold, Variable
 
@@ -413,7 +413,7 @@ def _is_too_close(objective: Variable, value: float, bound: Threshold) -> bool:
     return any(bound.met(value * (1 + side * objective.accuracy)) for side in (-1, 1))
 
 
-def _judge_check(check: Check) -> ObjectiveResult:
+def _judge_check(check: OutcomeCheck) -> ObjectiveResult:
     variable = Variable(check.name, Role.OBJECTIVE, type="bool", doc=check.doc, kind="functional", threshold=_YES)
     result = _judge_one(variable, check.value, _YES)
     return replace(result, reason=check.otherwise) if result.status == "fault" else result

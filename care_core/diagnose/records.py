@@ -92,11 +92,26 @@ class ObjectiveResult(Record):
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
 
 
+_MISSED = {
+    "mission_time": "too slow: {}",
+    "energy": "too much energy: {}",
+    "path_error_max": "off its path by up to {}",
+    "height_error": "off its height by {} on average",
+    "airspeed_error": "off its airspeed by {} on average",
+    "depth_error": "off its depth by {} rms",
+}
+"""What it is to be above the limit of an objective that many profiles have."""
+MISSION_FAILED = "the mission failed"
+"""All that is known of a mission that failed where nothing says how."""
+
+
 def outcome(name: str, kind: Kind | None, value: float | None, unit: str, threshold: str, reason: str) -> str:
     """An objective that was missed, in a clause: how it failed, or what it came to and what was wanted."""
     if kind == "functional":
-        return reason or f"{name} not met"
+        return reason or (MISSION_FAILED if name.casefold() == "mission_success" else f"{name} not met")
     measured = "unknown" if value is None else f"{value:.4g} {unit}".rstrip()
+    if name in _MISSED and threshold.startswith("<"):
+        return f"{_MISSED[name].format(measured)}, limit {threshold.lstrip('<= ')} {unit}".rstrip()
     wanted = f", wanted {threshold} {unit}".rstrip() if threshold else ""
     return f"{name} {measured}{wanted}"
 

@@ -13,7 +13,7 @@ from care_core.diagnose.records import Fix, ObjectiveResult
 from care_core.diagnose.worth import by_chance
 
 
-def reference_of(judged: Judged) -> str:
+def reference_note(judged: Judged) -> str:
     """Whose configuration the run was judged against, and how far from it it was driven."""
     off, known = len(deviating(judged.run.config, judged.reference.config)), len(judged.run.config)
     count = f"{off} of the profile's {known} parameters differ{'s' * (off == 1)}"

@@ -14,14 +14,14 @@ from care_core.diagnose.blame import blame
 from care_core.diagnose.causes import UNSURE, as_in_fix, as_ranked, causes_of
 from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.failed_run import FailedRun
-from care_core.diagnose.hypotheses import hypotheses_of, speaking, unasked
+from care_core.diagnose.hypotheses import evidence_of_findings, hypotheses_of, hypotheses_without_model
 from care_core.diagnose.judging import Judged, check_wishes, query_of
 from care_core.diagnose.next_step import again, bench, was_upset
 from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.outside.change import check_first, leading_outside, shown_fix
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult, OutsideSuspect
-from care_core.diagnose.remarks import notes_of, reference_of
+from care_core.diagnose.remarks import notes_of, reference_note
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import SAME_AGAIN, tell_more, to_record
 from care_core.diagnose.unexplained import out_of_reach, refused_otherwise
@@ -91,15 +91,15 @@ def diagnose(
     good run, None where none is known."""
     report = progress or (lambda _step, _share: None)
     schema, broken = profile.schema, judged.broken
-    said = speaking(health.findings, schema, judged.run.config)
-    run = judged.run.hearing(*said.values())
+    said = evidence_of_findings(health.findings, schema, judged.run.config)
+    run = judged.run.with_evidence(*said.values())
     choice = replace(choice, fit=choice.fit.with_objection(*unusual(run, profile)))
     if not broken:
         return _within_limits(judged, schema, choice, run, said, health, good)
     report("ranking the causes", 0.7)
     query = query_of(judged, profile, keep)
     blamed = blame(judged, profile, query, health, good)
-    failed = FailedRun(profile, choice, run, query, reference_of(judged), blamed.unranked, health.findings)
+    failed = FailedRun(profile, choice, run, query, reference_note(judged), blamed.unranked, health.findings)
     unheard = _unheard(failed, broken, health)
     faults = tuple(
         Fault(result, () if why else causes_of(failed, result, blamed.ranked[result.variable.name], top))
@@ -156,7 +156,9 @@ def _within_limits(
     missed = [result for result in judged.checks if result.status == "fault"]
     outside = suspects_outside(run, missed, health, schema, good=good) if _failed(missed, health) else ()
     weights = _weights(outside)
-    told = unasked(health.findings, missed=missed, shown=said, verdict=choice.fit.verdict, outside=weights)
+    told = hypotheses_without_model(
+        health.findings, missed=missed, shown=said, verdict=choice.fit.verdict, outside=weights
+    )
     lead = leading_outside(told, outside, health.findings, run)
     fix = shown_fix(lead, run) or shown_back(judged, schema, told, said, health.findings)
     return Diagnosis(
@@ -165,7 +167,7 @@ def _within_limits(
         (*judged.results, *judged.checks),
         (),
         fix,
-        notes=(*_set_wrong(judged, told, said), *(() if run.checks else (reference_of(judged),))),
+        notes=(*_set_wrong(judged, told, said), *(() if run.checks else (reference_note(judged),))),
         missions=judged.missions,
         health=health,
         abstained=None if lead is None or fix is not None else check_first(lead),
@@ -217,7 +219,7 @@ def unjudged(log: LogInfo, settings: Mapping[str, Setting], choice: ProfileChoic
     """The answer for a log that no profile fits: what happened in it is all that can be said."""
     whole = MissionInfo(0, 0, 0.0, log.duration_s, ended=True, fits=False)
     run = Run({}, {}, {}, {}, settings, log, whole)
-    explained = unasked(health.findings)
+    explained = hypotheses_without_model(health.findings)
     return Diagnosis(choice, run, (), (), None, health=health, hypotheses=explained)
 
 
@@ -225,7 +227,7 @@ def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Di
     """The answer for a run that no profile fits: what it did and what failed, and no cause by parameters."""
     broken = tuple(result for result in judged.checks if result.status == "fault")
     outside = suspects_outside(judged.run, broken, health) if _failed(broken, health) else ()
-    told = unasked(health.findings, missed=broken, outside=_weights(outside))
+    told = hypotheses_without_model(health.findings, missed=broken, outside=_weights(outside))
     lead = leading_outside(told, outside, health.findings, judged.run)
     return Diagnosis(
         choice,

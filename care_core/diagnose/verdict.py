@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal, Protocol, TypeVar
 
 from care_core.diagnose.next_step import next_step
-from care_core.diagnose.records import UNLIKELY, Confidence, Diagnosis, Hypothesis, Since, Status, helps
+from care_core.diagnose.records import MISSION_FAILED, UNLIKELY, Confidence, Diagnosis, Hypothesis, Since, Status, helps
 from care_core.ecosystems.findings import BY_STICK, WHOLE_LOG, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
@@ -346,7 +346,7 @@ def _failed(
         return _fault(objectives, findings)
     unknown = [one for one in objectives if one.status == "not_evaluated"]
     if fit == "no" and len(unknown) == len(objectives):
-        return unjudged(findings)
+        return why_unjudged(findings)
     if unknown:
         reasons = [one.reason for one in unknown if one.reason]
         reason = next(iter(reasons), "")
@@ -374,7 +374,7 @@ def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding
     is_refused = any("arming was refused" in sentence for sentence in broken)
     worst = [one for one in _worst(findings) if one.title not in "; ".join(broken)]
     found = [_with_time(one) for one in worst if not (is_refused and one.kind == "prearm")]
-    if not found and any(sentence.endswith(" not met") for sentence in broken):
+    if not found and any(sentence.endswith((MISSION_FAILED, " not met")) for sentence in broken):
         found = [_with_time(one) for one in findings if one.severity == "warning"][:1]
     if objectives and all(one.status == "ok" for one in objectives):
         found.append("every objective was met")
@@ -423,7 +423,7 @@ def _is_broken_part(finding: SeenFinding) -> bool:
     return finding.severity == "warning" and finding.suspect == "hardware" and is_sure
 
 
-def unjudged(findings: Sequence[SeenFinding]) -> str:
+def why_unjudged(findings: Sequence[SeenFinding]) -> str:
     """Why nothing is judged where no profile fits: what kept the vehicle from arming, or that too little is there."""
     refused = next((one.title for one in findings if one.kind == "prearm"), "")
     if refused:

@@ -1,7 +1,7 @@
 """Report and the run after it -> was the change made, and did it do what was promised?
 
-The report is plain data (`Promise`), so this module knows no file format; `care_core.report.verification` fills it in.
-The run comes as triage leaves it: what triage does not find well has not recovered.
+The report is plain data (`ReportedPromise`), so this module knows no file format; `care_core.report.verification`
+fills it in. The run comes as triage leaves it: what triage does not find well has not recovered.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Outcome = Literal["recovered", "kept", "unchanged", "better", "worse", "broken",
 VerifyVerdict = Literal["fixed_as_promised", "fixed_although", "not_fixed", "change_not_made", "cannot_tell"]
 
 
-class Before(Record):
+class ReportedObjective(Record):
     """An objective as the report has it. `need`: what the reference configuration needed for that mission, where the
     threshold is a multiple of it; None where the threshold holds for any mission."""
 
@@ -47,7 +47,7 @@ _FROM_HOME = ("path_length", "return_distance")
 _ONE_BY_ONE = ("goals_asked", "px4_mission_asked")
 """Extractors of what a log names as it is begun: a mission that is given up asks for less than all of it."""
 
-NOT_HELD = Before(None, "not_evaluated", None)
+NOT_HELD = ReportedObjective(None, "not_evaluated", None)
 """An objective of which the report says nothing."""
 
 
@@ -61,7 +61,7 @@ class PromisedSet(Record):
     """Per objective the 80 % interval."""
 
 
-class Promise(Record):
+class ReportedPromise(Record):
     """What a report said and promised: the suggested set first, then its alternatives."""
 
     sha256: str
@@ -71,7 +71,7 @@ class Promise(Record):
     """Of the profile."""
 
     config: Mapping[str, float]
-    objectives: Mapping[str, Before]
+    objectives: Mapping[str, ReportedObjective]
     sets: tuple[PromisedSet, ...]
     format: str = ""
     frame: str = ""
@@ -106,7 +106,7 @@ class ObjectiveCheck(Record):
     to the mission of the run after."""
 
     variable: Variable
-    before: Before
+    before: ReportedObjective
     after: ObjectiveResult
     outcome: Outcome
     interval: tuple[float, float] | None
@@ -135,7 +135,9 @@ class Verification(Record):
         return self.verdict != "not_fixed"
 
 
-def verify(promise: Promise, diagnosis: Diagnosis, schema: Schema, thresholds: Container[str] = ()) -> Verification:
+def verify(
+    promise: ReportedPromise, diagnosis: Diagnosis, schema: Schema, thresholds: Container[str] = ()
+) -> Verification:
     """Compare a run, as triage judged it, with what was promised for it.
 
     Every objective of the profile counts, whatever the report names, and so does every finding. A limit of the report's
@@ -168,7 +170,7 @@ def verify(promise: Promise, diagnosis: Diagnosis, schema: Schema, thresholds: C
     return Verification(verdict, sentence, chosen, kept.p_fixed, changes, others, checks, headline, notes)
 
 
-def _own_limits(promise: Promise, schema: Schema) -> dict[str, Threshold]:
+def _own_limits(promise: ReportedPromise, schema: Schema) -> dict[str, Threshold]:
     """Fixed limits of the report that are not the profile's: whoever made it gave them."""
     usual = thresholds_in_force(schema, {})
     return {
@@ -187,7 +189,7 @@ def _held_to(result: ObjectiveResult, own: Threshold | None) -> ObjectiveResult:
     return replace(result, threshold=own, need=None, status="fault", reason="by the report's own limit")
 
 
-def _doubt(promise: Promise, run: Run, schema: Schema, changes: Iterable[MadeChange]) -> str:
+def _doubt(promise: ReportedPromise, run: Run, schema: Schema, changes: Iterable[MadeChange]) -> str:
     """Why the run may not be of the same robot or mission, one clause; empty where it is."""
     if run.log.sha256 == promise.sha256:
         return SAME_LOG
@@ -195,7 +197,7 @@ def _doubt(promise: Promise, run: Run, schema: Schema, changes: Iterable[MadeCha
     return mismatch or _another_vehicle(promise, run.log, changes) or next(_asked_otherwise(promise, run, schema), "")
 
 
-def _another_vehicle(promise: Promise, log: LogInfo, changes: Iterable[MadeChange]) -> str:
+def _another_vehicle(promise: ReportedPromise, log: LogInfo, changes: Iterable[MadeChange]) -> str:
     """What tells that the log is of another vehicle, one clause; a frame that the report changes is the same one's."""
     reframed = any("FRAME" in name for change in changes for name in change.option.parameters)
     frame = log.facts.get("frame", "")
@@ -205,7 +207,7 @@ def _another_vehicle(promise: Promise, log: LogInfo, changes: Iterable[MadeChang
     return "this is another vehicle: it has another id than that of the report" if is_other else ""
 
 
-def _asked_otherwise(promise: Promise, run: Run, schema: Schema) -> Iterator[str]:
+def _asked_otherwise(promise: ReportedPromise, run: Run, schema: Schema) -> Iterator[str]:
     """What the run's mission asks for and that of the report does not, in clauses. How a planner writes an item, what
     is no waypoint, and where home is within a field make no other mission."""
     functional = {one.name for one in schema.objectives if one.kind == "functional"}
@@ -234,7 +236,7 @@ def _another_mission(checks: Iterable[ObjectiveCheck]) -> Iterator[str]:
 
 
 def _notes(
-    promise: Promise, run: Run, schema: Schema, results: Iterable[ObjectiveResult], own: Mapping[str, Threshold]
+    promise: ReportedPromise, run: Run, schema: Schema, results: Iterable[ObjectiveResult], own: Mapping[str, Threshold]
 ) -> Iterator[str]:
     if promise.version != schema.version:
         yield f"the report was written with version {promise.version} of the profile, not {schema.version}"
@@ -274,7 +276,7 @@ def _share_made(changes: Sequence[MadeChange]) -> float:
     return sum(change.made == "made" for change in changes) / max(1, len(changes))
 
 
-def _others(promise: Promise, chosen: PromisedSet, run: Run, schema: Schema) -> Iterator[OtherChange]:
+def _others(promise: ReportedPromise, chosen: PromisedSet, run: Run, schema: Schema) -> Iterator[OtherChange]:
     for option in schema.options:
         before, driven = promise.config.get(option.name), run.config.get(option.name)
         if (
@@ -286,7 +288,7 @@ def _others(promise: Promise, chosen: PromisedSet, run: Run, schema: Schema) -> 
             yield OtherChange(option, before, driven)
 
 
-def _check(before: Before, after: ObjectiveResult, interval: tuple[float, float] | None) -> ObjectiveCheck:
+def _check(before: ReportedObjective, after: ObjectiveResult, interval: tuple[float, float] | None) -> ObjectiveCheck:
     """Both measured by what the reference configuration needs, where the threshold is: the missions may differ."""
     longer = after.need.value / before.need if after.need is not None and before.need else 1.0
     if interval is not None:

@@ -16,7 +16,7 @@ from care_core.ecosystems.coverage import Samples, doubt
 from care_core.errors import ProfileError, nearest
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record, field
-from care_core.run import Check, Evidence, Unavailable, Value
+from care_core.run import Evidence, OutcomeCheck, Unavailable, Value
 
 Args = Mapping[str, Any]
 T = TypeVar("T")
@@ -141,11 +141,11 @@ class MissionKind(ABC):
         """Whether the log says how the mission came out: it holds its end, or what made it fail for good."""
         return mission.ended
 
-    def checks(self, mission: Mission) -> tuple[Check, ...]:
+    def checks(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         """What a run that had no mission is judged by; none where there was one."""
         return ()
 
-    def outcome(self, mission: Mission) -> tuple[Check, ...]:
+    def outcome(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         """What any run is judged by where no profile fits: by what its robot says of itself, and by no limit."""
         return ()
 

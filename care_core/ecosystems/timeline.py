@@ -1,4 +1,4 @@
-"""Moments of an account put together: repeats told once, changes of parameters, gaps and damage, order and length."""
+"""Events of a timeline put together: repeats told once, changes of parameters, gaps and damage, order and length."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def timeline_of(events: Iterable[Event], introduction: Event, most: int = MOST) 
 
 
 def repeats(events: Sequence[Event]) -> Iterator[Event]:
-    """Moments that differ in nothing but numbers as one, with their count and when the last one was."""
+    """Events that differ in nothing but numbers as one, with their count and when the last one was."""
     groups: dict[tuple[str, str], list[Event]] = {}
     for event in events:
         groups.setdefault((event.kind, but_for_numbers(event.text)), []).append(event)
@@ -147,7 +147,7 @@ def counted(number: int, what: str, plural: str = "s") -> str:
 
 
 def _place(event: Event) -> tuple[bool, float, int]:
-    """Where a event stands: by time to a tenth of a second, then by kind; what has no time comes last."""
+    """Where an event stands: by time to a tenth of a second, then by kind; what has no time comes last."""
     known = math.isfinite(event.time_s)
     return not known, round(event.time_s, 1) if known else 0.0, _AT_ONCE.index(event.kind)
 

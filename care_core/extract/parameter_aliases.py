@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from care_core.ecosystems.ros.plugin_names import named_here
-from care_core.ecosystems.vehicles import alias_in, vehicle_of
+from care_core.ecosystems.vehicles import vehicle_of
 from care_core.logs.base import Log
+from care_core.metadata.aliases import alias_in
 from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.run import Settings

@@ -20,7 +20,7 @@ from care_core.logs.formats import format_named
 from care_core.logs.identity import recording_of
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
-from care_core.run import Check, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
+from care_core.run import LogInfo, MissionInfo, OutcomeCheck, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
 
 
@@ -216,7 +216,7 @@ class _Source(Record, eq=False):
         extract = self.schema.variables[context].extract
         return extract is not None and extract.kind in _REQUESTED
 
-    def _checks(self, mission: Mission) -> tuple[Check, ...]:
+    def _checks(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         checks = self.kind.checks(mission) if self.schema.objectives else self.kind.outcome(mission)
         return tuple(replace(check, value=self._explained(check.value)) for check in checks)
 

@@ -1,7 +1,7 @@
 """From a runs table to a partial ancestral graph (paper, Alg. 1, lines 3 and 4): FCI.
 
 The adjacency search is ours, on whole arrays of conditioning sets: causal-learn tests one set at a time, also for pairs
-that are independent by design, and of_objectives possible d-separating sets of any size. The orientation rules are
+that are independent by design, and searches possible d-separating sets of any size. The orientation rules are
 causal-learn's. Its background knowledge is not used: it turns a forbidden `X <- Y` into a tail at X, so that a purely
 confounded pair comes out as `X --> Y` and the search for a latent cause never sees it. Here what a variable cannot
 cause becomes an arrowhead, and a tail is only given to what was drawn at random or met (`Constraints.is_exogenous`).

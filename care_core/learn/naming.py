@@ -11,10 +11,10 @@ from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import EdgeRecord, EffectRecord, Model
 from care_core.diagnose.ranking import suspects
-from care_core.learn.baselines import cooperative_bug_isolation
+from care_core.learn.bug_isolation import cooperative_bug_isolation
 from care_core.learn.fault_files import FAULTY_RUNS, FaultFile
 from care_core.learn.outcomes import met
-from care_core.learn.transfer import carry_over
+from care_core.learn.transfer import transfer_to
 from care_core.numbers import Bools
 from care_core.profile.schema import Schema
 from care_core.records import replace
@@ -70,7 +70,7 @@ def taught_by(schema: Schema, model: Model, fault: FaultFile) -> Model:
     graph = CausalGraph(model.graph.nodes, model.graph.directed | links, model.graph.bidirected)
     outcome = model.outcomes[fault.objective]
     keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
-    _, mechanisms = carry_over(model, schema, fault.runs, graph, np.random.default_rng(0), only=keys)
+    _, mechanisms = transfer_to(model, schema, fault.runs, graph, np.random.default_rng(0), only=keys)
     edges = {(a, b): EdgeRecord(source=a, target=b, kind="directed", support=1.0) for a, b in links}
     effects = {
         (a, b): EffectRecord(

@@ -29,7 +29,6 @@ class Structure(Record, eq=False):
     """What was learned. `graph` has all variables of the schema; those set aside stand alone in it."""
 
     graph: CausalGraph
-    pag: Pag
     dropped_options: tuple[str, ...]
     direct: tuple[DirectEdge, ...]
     """Option to objective edges that were allowed, because the metrics do not carry the whole effect."""
@@ -75,7 +74,6 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
     together = chosen_together(frame, schema, screening.kept)
     return Structure(
         graph=_with_hidden_reasons(completion.graph, pag, together, constraints),
-        pag=pag,
         dropped_options=screening.dropped,
         direct=completion.direct,
         notes=(

@@ -52,8 +52,8 @@ BACKGROUND = 32
 EFFECT_RESAMPLES = 20
 """Bootstrap resamples behind the intervals of effects (mechanisms are refitted with their kernels kept)."""
 TOP_PATHS = 20
-WITNESS_Z = 1.96
-"""How many standard errors a correlation must be off 0 before a metric counts as a witness."""
+CORRELATED_Z = 1.96
+"""How many standard errors a correlation must be off 0 before a metric counts as correlated."""
 QUANTILES = np.linspace(0, 1, 21)
 
 
@@ -425,7 +425,7 @@ def _correlated_metrics(
             if both.sum() < MIN_ROWS or np.ptp(values[both]) == 0 or np.ptp(bad[both]) == 0:
                 continue
             r = float(np.corrcoef(values[both], bad[both])[0, 1])
-            if abs(r) > WITNESS_Z / np.sqrt(both.sum()):
+            if abs(r) > CORRELATED_Z / np.sqrt(both.sum()):
                 found.setdefault(objective.name, {})[metric.name] = r
     return found
 

@@ -77,7 +77,7 @@ def update(
 
 def _shifted_only(source: Model, schema: Schema, frame: pd.DataFrame, settings: TrainSettings) -> Model:
     """The source's model with its mechanisms moved to the target's runs."""
-    outcomes, mechanisms = carry_over(source, schema, frame, source.graph, np.random.default_rng(settings.seed))
+    outcomes, mechanisms = transfer_to(source, schema, frame, source.graph, np.random.default_rng(settings.seed))
     ratios = relative(frame, schema)
     notes = (
         f"Carried over from a model of {source.training.runs} runs: graph, effects and skill are that model's.",
@@ -110,7 +110,7 @@ def _update(source: Model, schema: Schema, frame: pd.DataFrame, settings: TrainS
     completion = complete(ratios, schema, source.graph, screen_options(ratios, schema).kept)
     graph = completion.graph
     report("carrying the mechanisms over", 0.2)
-    outcomes, mechanisms = carry_over(source, schema, frame, graph, rng)
+    outcomes, mechanisms = transfer_to(source, schema, frame, graph, rng)
     training = Training(
         origin=_origin(source, settings),
         runs=len(frame),
@@ -148,7 +148,7 @@ def _support_of(source: Model) -> dict[Finding, float]:
     return support
 
 
-def carry_over(
+def transfer_to(
     source: Model,
     schema: Schema,
     frame: pd.DataFrame,

@@ -11,7 +11,7 @@ from typing import TypeVar
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.lint.documented import meant_instead, not_listed, share_known, unknown_bits
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.metadata import ardupilot
 from care_core.metadata.aliases import aliases_of
 from care_core.metadata.ardupilot import Release
@@ -47,7 +47,7 @@ _FAR = 10.0
 """Documented ranges are what is usual: what lies beyond the bound by less than this factor is worth a note alone."""
 
 
-def releases_of(file: ConfigFile, target: str) -> tuple[tuple[Release, ...], bool]:
+def releases_of(file: LintedFile, target: str) -> tuple[tuple[Release, ...], bool]:
     """The releases that a file may be for, and whether anybody says so.
 
     Args:
@@ -89,7 +89,7 @@ def _asked(letter: str, version: str) -> tuple[Release, ...]:
     return tuple(one for one in own if one.version == version) or own
 
 
-def check(file: ConfigFile, target: str) -> Iterator[Problem]:
+def check(file: LintedFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of an ArduPilot vehicle's parameters."""
     releases, is_told = releases_of(file, target)
     for entry in file.entries:
@@ -104,7 +104,7 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
             yield from _value(file, entry, ardupilot.facts_of(entry.name, releases))
 
 
-def _unknown(file: ConfigFile, entry: Entry) -> Problem:
+def _unknown(file: LintedFile, entry: Entry) -> Problem:
     is_older = entry.name in _OLDER
     meant = "" if is_older else meant_instead(entry.name, {one.name for one in file.entries}, ardupilot.names())
     if meant:
@@ -114,7 +114,7 @@ def _unknown(file: ConfigFile, entry: Entry) -> Problem:
     return file.note("unknown-key", entry, text, "Check its spelling.", _LISTS)
 
 
-def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[Release], is_told: bool) -> Problem:
+def _elsewhere(file: LintedFile, entry: Entry, releases: Sequence[Release], is_told: bool) -> Problem:
     """A name of other releases than those the file is for."""
     new = _renamed(entry.name, releases)
     is_sure = is_told and (new is not None or all(_parts(one) >= _COMPLETE for one in releases))
@@ -145,7 +145,7 @@ def _told(releases: Sequence[Release]) -> str:
     return f"{releases[0]} to {releases[-1].version}"
 
 
-def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
+def _value(file: LintedFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
     """A value that no release that the file may be for allows."""
     value = entry.number
     if value is None or math.isnan(value) or not facts:
@@ -182,7 +182,7 @@ def _within(value: float, fact: Fact) -> bool:
     return fact.low - near <= value <= fact.high + near or any(value == code for code, _ in fact.values)
 
 
-def _outside(file: ConfigFile, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Problem]:
+def _outside(file: LintedFile, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Problem]:
     """A number outside the documented ranges. 0 and -1 mean "off" or "not set" for many parameters and are let be."""
     fact = facts[-1]
     low, high = fact.low or 0.0, fact.high or 0.0

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from care_core.errors import nearest
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.lint.readers import OBSTACLES, readers
 from care_core.lint.scopes import Scoped
 from care_core.metadata.navigation import DISTRIBUTIONS, spanned
@@ -58,7 +58,7 @@ _OWN = re.compile(r"nav2_amcl::|^\w+$")
 """Of plugins: only words without a package and names of Nav2's own; another package may bring more."""
 
 
-def check(file: ConfigFile, result: Scoped, likely: frozenset[str]) -> Iterator[Problem]:
+def check(file: LintedFile, result: Scoped, likely: frozenset[str]) -> Iterator[Problem]:
     """Words that none of the releases knows for which the file may be.
 
     Args:
@@ -83,7 +83,7 @@ def _is_refused(entry: Entry, choice: Choice) -> bool:
     return choice.name != "robot_model_type" or bool(_OWN.search(word))
 
 
-def _refused(file: ConfigFile, entry: Entry, choice: Choice) -> Problem:
+def _refused(file: LintedFile, entry: Entry, choice: Choice) -> Problem:
     text = f"{entry.keys[-1]} is {entry.value}, which is none of its values: {choice.why}."
     hint = f"They are {', '.join(choice.words)}."
     meant = nearest(str(entry.value), choice.words)

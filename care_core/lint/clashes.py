@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import NamedTuple
 
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.metadata.refusals import RELATIONS
 
 _CLASH, _BROKEN, _HINDERS, _UNIT = "contradiction", "cannot-work", "hinders", "wrong-unit"
@@ -200,7 +200,7 @@ PX4: tuple[Clash, ...] = (
 )  # fmt: skip
 
 
-def check(file: ConfigFile, values: Mapping[str, Entry], clashes: Sequence[Clash]) -> Iterator[Problem]:
+def check(file: LintedFile, values: Mapping[str, Entry], clashes: Sequence[Clash]) -> Iterator[Problem]:
     """Conditions that hold in a file."""
     for clash in clashes:
         for number in clash.numbers:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 
 
 class Pair(NamedTuple):
@@ -81,7 +81,7 @@ _INFLATION = (
 )
 
 
-def pairs(file: ConfigFile, values: Mapping[str, Entry], known: Sequence[Pair]) -> Iterator[Problem]:
+def pairs(file: LintedFile, values: Mapping[str, Entry], known: Sequence[Pair]) -> Iterator[Problem]:
     """Pairs of one scope that contradict each other."""
     for pair in known:
         low, high = values.get(pair.low), values.get(pair.high)
@@ -129,7 +129,7 @@ def _distance_to(x: float, y: float, to_x: float, to_y: float) -> float:
     return math.hypot(x + share * along_x, y + share * along_y)
 
 
-def inflation(file: ConfigFile, radius: float | None, inflations: Sequence[Entry]) -> Iterator[Problem]:
+def inflation(file: LintedFile, radius: float | None, inflations: Sequence[Entry]) -> Iterator[Problem]:
     """Inflation that is smaller than the robot."""
     for entry in inflations:
         if radius is not None and entry.number is not None and 0 < entry.number < radius * (1 - 1e-6):

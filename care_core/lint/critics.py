@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.errors import nearest
-from care_core.lint.problems import ConfigFile, Problem, Severity
+from care_core.lint.problems import LintedFile, Problem, Severity
 from care_core.lint.readers import Reader, Readers
 from care_core.lint.scopes import class_of, words_of
 
@@ -20,7 +20,7 @@ _SPEEDS = (
 )
 
 
-def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _drawn(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """DWB without any critic that draws it along: every free trajectory is as good as standing."""
     for reader in held.of("DWBLocalPlanner"):
         entry, known = reader.values.get("critics"), set(_classes(reader).values())
@@ -40,7 +40,7 @@ def _classes(reader: Reader) -> dict[str, str]:
     return found
 
 
-def _misspelled(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _misspelled(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Critics that the package in which DWB looks for names without one does not have."""
     for reader in held.of("DWBLocalPlanner"):
         entry = reader.values.get("critics")
@@ -58,7 +58,7 @@ def _looks_elsewhere(reader: Reader) -> bool:
     return "default_critic_namespaces" in reader.values
 
 
-def _turning(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _turning(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Turns that must be faster than they may: no turn in place is valid, unless min_speed_xy lets all speeds be."""
     for reader in held.of("DWBLocalPlanner"):
         entry, top = reader.values.get("min_speed_theta"), reader.values.get("max_vel_theta")

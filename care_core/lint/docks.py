@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.lint.generic import near
-from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.problems import LintedFile, Problem
 from care_core.lint.readers import Readers, numbers
 from care_core.lint.scopes import words_of
 
@@ -14,7 +14,7 @@ _DATABASE = "dock_database.cpp of opennav_docking, findDockPlugin"
 _POSE = 3
 
 
-def _docks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _docks(file: LintedFile, held: Readers) -> Iterator[Problem]:
     for reader in held.of("docking_server"):
         kinds = words_of(reader.values.get("dock_plugins"))
         for dock in (one for one in held.within(reader.scope) if one.is_a("Dock")):

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.metadata.fact import Fact
 
 _ALIKE = 0.84
@@ -27,7 +27,7 @@ def share_known(names: Collection[str], known_in: Callable[[str], Collection[obj
     return sum(bool(known_in(name)) for name in names) / max(len(names), 1)
 
 
-def not_listed(file: ConfigFile, entry: Entry, value: float, fact: Fact) -> Problem:
+def not_listed(file: LintedFile, entry: Entry, value: float, fact: Fact) -> Problem:
     """A value that is none of those of a list."""
     codes = [f"{code:g}" for code, _ in fact.values]
     text = f"{entry.name} is {value:g}, which is none of the values of {fact.source}."
@@ -35,7 +35,7 @@ def not_listed(file: ConfigFile, entry: Entry, value: float, fact: Fact) -> Prob
     return file.warning("not-in-values", entry, text, hint, fact.source)
 
 
-def unknown_bits(file: ConfigFile, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Problem]:
+def unknown_bits(file: LintedFile, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Problem]:
     """Bits of a value that none of several releases documents; the last is named."""
     if value <= 0 or not value.is_integer():
         return

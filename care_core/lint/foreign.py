@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from care_core.lint.lists import Raised
-from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.problems import LintedFile, Problem
 from care_core.lint.scopes import Keys, Place, Scoped
 from care_core.metadata import navigation
 from care_core.metadata.navigation import STACKS
@@ -14,7 +14,7 @@ _MANY = 5
 """Names of another plugin from which on they are told as one: of two similar plugins a few are left over."""
 
 
-def foreign(file: ConfigFile, result: Scoped) -> Iterator[Raised]:
+def foreign(file: LintedFile, result: Scoped) -> Iterator[Raised]:
     """Names that a plugin does not read and one other of the same node does, where they are many."""
     by_part: dict[tuple[Keys, Keys], list[Place]] = {}
     for place in result.places:
@@ -45,7 +45,7 @@ def _beside(result: Scoped, owners: Keys) -> Iterator[str]:
             yield one
 
 
-def _problem(file: ConfigFile, result: Scoped, owners: Keys, other: str, places: Sequence[Place]) -> Problem:
+def _problem(file: LintedFile, result: Scoped, owners: Keys, other: str, places: Sequence[Place]) -> Problem:
     first, *more = places
     text = f"{first.name} and {len(more)} more are parameters of {other}: {owners[0]} does not read them."
     hint = f"Leave them out, or load {other} and write them below its name."

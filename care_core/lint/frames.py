@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.readers import Readers
 from care_core.lint.scopes import COSTMAP
 
@@ -16,7 +16,7 @@ _LATEST_S = 5.0
 """Transforms this far in the future, s: Nav2 and ROS 1 have 1.0 and 0.1, slow computers set 2."""
 
 
-def _bases(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _bases(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Robots that are looked for in another frame by one node than by the others."""
     found = [
         (reader.name() or reader.owners[0], entry)
@@ -36,7 +36,7 @@ def _bases(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         yield file.warning("contradiction", entry, text, "Give all the same.", source, others[:1])
 
 
-def _moving(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _moving(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Costmaps in the frame of the robot itself: what was seen moves along with it."""
     for reader in held.of(COSTMAP):
         entry, base = reader.values.get("global_frame"), reader.values.get("robot_base_frame")
@@ -56,7 +56,7 @@ def _body(frame: str) -> str:
     return _ABOVE.sub("base", frame)
 
 
-def _postdated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _postdated(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Corrections of amcl that come late: it dates them ahead, and tf interpolates between what was dated so."""
     for reader in held.of("amcl"):
         entry = reader.values.get("transform_tolerance")

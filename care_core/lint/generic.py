@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from care_core.configs.driven import same_value
 from care_core.ecosystems.not_numbers import instead
 from care_core.ecosystems.px4.dialect import QGC_PARAMS
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.metadata import ardupilot, px4
 from care_core.run import shown
 
@@ -29,7 +29,7 @@ def near(name: str, known: Iterable[str]) -> str:
     return next(iter(get_close_matches(name, known, n=1, cutoff=_ALIKE)), "")
 
 
-def check(file: ConfigFile) -> Iterator[Problem]:
+def check(file: LintedFile) -> Iterator[Problem]:
     """What is wrong with a file whatever it configures."""
     first: dict[tuple[str, ...], Entry] = {}
     for entry in file.entries:
@@ -55,7 +55,7 @@ def _default(name: str) -> float | None:
     return told.pop() if len(told) == 1 else None
 
 
-def _twice(file: ConfigFile, earlier: Entry, entry: Entry) -> Problem:
+def _twice(file: LintedFile, earlier: Entry, entry: Entry) -> Problem:
     same = same_value(earlier.value, entry.value)
     counts = "QGroundControl counts the first" if file.format is QGC_PARAMS else "this one counts"
     said = "with the same value" if same else f"there {shown(earlier.value)}, here {shown(entry.value)}: {counts}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from care_core.ecosystems.ros.dialect import ROS2_YAML
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.readers import INFLATIONS, MARKING, OBSTACLES, Reader, Readers
 from care_core.lint.scopes import COSTMAP, class_of, words_of
 
@@ -18,7 +18,7 @@ Listed = Sequence[tuple[str, str]]
 _ORDER = "layered_costmap.cpp, updateMap: layers write into the costmap in the order of the list"
 
 
-def _marks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _marks(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Costmaps into which nothing puts obstacles, or out of which nothing takes them, and obstacles that stay."""
     for costmap in held.of(COSTMAP):
         layers = [one for one in held.within(costmap.scope) if one.is_a(*OBSTACLES)]
@@ -36,7 +36,7 @@ def _marks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         yield from _uncleared(file, reader)
 
 
-def _uncleared(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
+def _uncleared(file: LintedFile, reader: Reader) -> Iterator[Problem]:
     """Sources that mark obstacles farther away than they clear."""
     for short, far in (("raytrace_range", "obstacle_range"), ("raytrace_max_range", "obstacle_max_range")):
         keys = {key[: -len(last)] for key in reader.values for last in (short, far) if key.endswith(last)}
@@ -58,7 +58,7 @@ def _uncleared(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
                 yield file.warning("contradiction", entry, text, hint, "obstacle_layer.cpp", others)
 
 
-def _ordered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _ordered(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Layers of Nav2 that come too late in the list: it is the order in which they write into the costmap."""
     for reader in held.of(COSTMAP, "PluginContainerLayer"):
         entry, listed = reader.values.get("plugins"), _listed(held, reader)
@@ -74,7 +74,7 @@ def _listed(held: Readers, costmap: Reader) -> Listed:
     return [(name, class_of(str(one.value))) for name, one in classes.items() if name not in off]
 
 
-def _overwritten(file: ConfigFile, costmap: Reader, entry: Entry, listed: Listed) -> Iterator[Problem]:
+def _overwritten(file: LintedFile, costmap: Reader, entry: Entry, listed: Listed) -> Iterator[Problem]:
     """Obstacles over which a map is written."""
     maps = [place for place, (_, layer) in enumerate(listed) if layer == "StaticLayer"]
     marked = [name for name, layer in listed[: maps[-1] if maps else 0] if layer in MARKING]
@@ -85,7 +85,7 @@ def _overwritten(file: ConfigFile, costmap: Reader, entry: Entry, listed: Listed
         yield file.warning("hinders", entry, text, hint, "static_layer.cpp, updateCosts")
 
 
-def _not_inflated(file: ConfigFile, entry: Entry, listed: Listed) -> Iterator[Problem]:
+def _not_inflated(file: LintedFile, entry: Entry, listed: Listed) -> Iterator[Problem]:
     """Obstacles that are written after all inflation is done."""
     places = [place for place, (_, layer) in enumerate(listed) if layer in INFLATIONS]
     if not places:
@@ -101,7 +101,7 @@ def _not_inflated(file: ConfigFile, entry: Entry, listed: Listed) -> Iterator[Pr
         yield file.warning("hinders", entry, text, f"Put {last} after {name}.", _ORDER)
 
 
-def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _sourced(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Sources that are named otherwise than the part that is to describe them."""
     for reader in held.of(*OBSTACLES):
         entry = reader.values.get("observation_sources")
@@ -118,7 +118,7 @@ def _sourced(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         yield file.warning("contradiction", entry, text, hint, "obstacle_layer.cpp, onInitialize", others[:1])
 
 
-def _beside(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _beside(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Sources that stand beside an obstacle layer of Nav2, not in it: only layers read them."""
     for costmap in held.of(COSTMAP):
         entry = costmap.values.get("observation_sources")
@@ -133,7 +133,7 @@ def _beside(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("cannot-work", entry, text, hint, "obstacle_layer.cpp, onInitialize")
 
 
-def _drifting(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _drifting(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """A map that is drawn into a costmap of the odometry: it is not moved to where the robot is found on it."""
     for costmap in held.of(COSTMAP):
         frame = costmap.values.get("global_frame")
@@ -148,7 +148,7 @@ def _drifting(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("hinders", frame, text, hint, "static_layer.cpp, updateCosts: not rolling")
 
 
-def _holds_map(file: ConfigFile, held: Readers, costmap: Reader) -> bool:
+def _holds_map(file: LintedFile, held: Readers, costmap: Reader) -> bool:
     if file.format is ROS2_YAML:
         return any(layer == "StaticLayer" for _, layer in _listed(held, costmap))
     named = [class_of(kind) for keys, _, kind in file.named if keys == (*costmap.scope, "plugins")]

@@ -10,7 +10,7 @@ from care_core.configs.loading import split_name
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.errors import UsageError, nearest
 from care_core.lint import ardupilot, clashes, contradictions, generic, navigation, outputs, px4
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.reading import read_file
 from care_core.metadata.navigation import DISTRIBUTIONS
 from care_core.records import Record
@@ -27,7 +27,7 @@ _MOST_KNOWN = 0.5
 class Linted(Record):
     """One file and what was found in it, in the order of its lines."""
 
-    file: ConfigFile
+    file: LintedFile
     problems: tuple[Problem, ...]
     unknown: int = 0
     """Values of nodes, plugins and vehicles that no rule knows."""
@@ -70,14 +70,14 @@ def _lint(name: str, target: str, schema: Schema | None) -> Linted:
     return Linted(file, tuple(order), _unknown(file))
 
 
-def _unknown(file: ConfigFile) -> int:
+def _unknown(file: LintedFile) -> int:
     if file.format.is_yaml:
         return navigation.unknown(file)
     names = {entry.name for entry in file.entries}
     return 0 if max(px4.known(names), ardupilot.known(names)) > _MOST_KNOWN else len(file.entries)
 
 
-def _of_ecosystem(file: ConfigFile, target: str) -> Iterator[Problem]:
+def _of_ecosystem(file: LintedFile, target: str) -> Iterator[Problem]:
     if file.format.is_yaml:
         yield from navigation.check(file, target if target in _all_distributions() else "")
         return
@@ -96,7 +96,7 @@ def _all_distributions() -> set[str]:
     return {name for several in DISTRIBUTIONS.values() for name in several}
 
 
-def _of_profile(file: ConfigFile, schema: Schema) -> Iterator[Problem]:
+def _of_profile(file: LintedFile, schema: Schema) -> Iterator[Problem]:
     """Values outside what a profile holds acceptable."""
     entries = {_setting_name(file, entry): entry for entry in file.entries}
     settings = {name: Setting(name, entry.value, "") for name, entry in entries.items()}
@@ -112,7 +112,7 @@ def _of_profile(file: ConfigFile, schema: Schema) -> Iterator[Problem]:
             yield file.note("outside-profile", entries[setting.name], text, hint)
 
 
-def _setting_name(file: ConfigFile, entry: Entry) -> str:
+def _setting_name(file: LintedFile, entry: Entry) -> str:
     """A value's name as the reader of the format has it."""
     if file.format is not ROS2_YAML or "ros__parameters" not in entry.keys:
         return "/".join((*file.namespace.strip("/").split("/"), *entry.keys)).strip("/")

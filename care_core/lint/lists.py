@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.scopes import COSTMAP, Keys, Place, Scoped, of_class, split, words_of
 from care_core.metadata import navigation
 from care_core.metadata.navigation import STACKS, spanned, spans
@@ -61,7 +61,7 @@ _SEVERAL = 2
 _CLASSLESS = "node_utils.hpp of Nav2, get_plugin_type_param: a name without a class is refused"
 
 
-def classless(file: ConfigFile, result: Scoped, shown: frozenset[str]) -> Iterator[Problem]:
+def classless(file: LintedFile, result: Scoped, shown: frozenset[str]) -> Iterator[Problem]:
     """Names in a list of plugins of which nothing in the file says the class.
 
     Args:
@@ -84,14 +84,14 @@ def classless(file: ConfigFile, result: Scoped, shown: frozenset[str]) -> Iterat
             yield _classless(file, place, lacking)
 
 
-def _text(file: ConfigFile, place: Place, names: Sequence[str]) -> Problem:
+def _text(file: LintedFile, place: Place, names: Sequence[str]) -> Problem:
     text = f"{place.name} is a string, declared is a list of strings: the node will not start."
     hint = f"Write [{', '.join(repr(name) for name in names)}]."
     source = f"{STACKS['ros2']} declare a list of strings"
     return file.error("wrong-type", place.entry, text, hint, source)
 
 
-def by_default(file: ConfigFile, shown: frozenset[str]) -> Iterator[Problem]:
+def by_default(file: LintedFile, shown: frozenset[str]) -> Iterator[Problem]:
     """Parts without a class that a default list loads, with values of another class than the default one.
 
     Args:
@@ -112,7 +112,7 @@ def by_default(file: ConfigFile, shown: frozenset[str]) -> Iterator[Problem]:
             yield from _defaulted(file, name, kind, below)
 
 
-def _defaulted(file: ConfigFile, name: str, kind: str, below: Mapping[Keys, Entry]) -> Iterator[Problem]:
+def _defaulted(file: LintedFile, name: str, kind: str, below: Mapping[Keys, Entry]) -> Iterator[Problem]:
     unread = [keys for keys in below if not navigation.known("ros2", kind, ".".join(keys)) and len(keys) == 1]
     if len(unread) >= _SEVERAL:
         entry = below[unread[0]]
@@ -122,7 +122,7 @@ def _defaulted(file: ConfigFile, name: str, kind: str, below: Mapping[Keys, Entr
         yield file.warning("cannot-work", entry, text, hint, _CLASSLESS)
 
 
-def spare(file: ConfigFile) -> Iterator[Problem]:
+def spare(file: LintedFile) -> Iterator[Problem]:
     """Plugins of a node that none of its lists names."""
     values = {split(entry): entry for entry in file.entries}
     for keys, entry in values.items():
@@ -154,7 +154,7 @@ def _is_read(one: PluginList, shown: frozenset[str]) -> bool:
     return not shown or any(navigation.distributions(fact, "ros2") & shown for fact in facts)
 
 
-def _classless(file: ConfigFile, place: Place, names: list[str]) -> Problem:
+def _classless(file: LintedFile, place: Place, names: list[str]) -> Problem:
     what = "the costmap" if place.owners == (COSTMAP,) else place.owners[0]
     below, their, them = ("each of these names", "their", "them") if names[1:] else (names[0], "its", "it")
     text = f"{place.name} names {', '.join(names)}, and nothing here says {their} class: {what} will not start."
@@ -186,7 +186,7 @@ class Raised(NamedTuple):
     places: Sequence[Place]
 
 
-def raised(file: ConfigFile, result: Scoped, shown: frozenset[str]) -> Iterator[Raised]:
+def raised(file: LintedFile, result: Scoped, shown: frozenset[str]) -> Iterator[Raised]:
     """Values that a node does not read and one of its plugins does, where they are several.
 
     Args:
@@ -229,7 +229,7 @@ def _may_be_raised(place: Place, scope: Keys, values: Mapping[Keys, Entry]) -> b
 
 
 def _raised(
-    file: ConfigFile, plugin: Loaded, places: Sequence[Place], values: Mapping[Keys, Entry], shown: frozenset[str]
+    file: LintedFile, plugin: Loaded, places: Sequence[Place], values: Mapping[Keys, Entry], shown: frozenset[str]
 ) -> Problem:
     first, *more = places
     scope = first.scope

@@ -9,7 +9,7 @@ from itertools import combinations
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.generic import near
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.lint.readers import numbers
 
 _SOURCE = re.compile(r"(odom|pose|twist|imu)(\d+)")
@@ -66,7 +66,7 @@ def _is_navsat(values: Values) -> bool:
     return "magnetic_declination_radians" in values or {"wait_for_datum", "yaw_offset"} <= set(values)
 
 
-def check(file: ConfigFile) -> Iterator[Problem]:
+def check(file: LintedFile) -> Iterator[Problem]:
     """What is wrong with the nodes of robot_localization that a file holds."""
     for values in nodes(file):
         if is_filter(values):
@@ -79,7 +79,7 @@ def check(file: ConfigFile) -> Iterator[Problem]:
             yield from _of_navsat(file, values)
 
 
-def nodes(file: ConfigFile) -> Iterator[Values]:
+def nodes(file: LintedFile) -> Iterator[Values]:
     """The values of each node, of a file of ROS 1 those of each part."""
     found: dict[tuple[str, ...], dict[str, Entry]] = {}
     for entry in file.entries:
@@ -93,7 +93,7 @@ def is_filter(values: Values) -> bool:
     return any((match := _OF_SOURCE.fullmatch(name)) is not None and match[2] == "config" for name in values)
 
 
-def _unread(file: ConfigFile, values: Values, known: tuple[str, ...]) -> Iterator[Problem]:
+def _unread(file: LintedFile, values: Values, known: tuple[str, ...]) -> Iterator[Problem]:
     """Names that are a slip of the pen: a node of one's own may add others."""
     for name, entry in values.items():
         of_source = _OF_SOURCE.fullmatch(name) if known is _FILTER else None
@@ -108,14 +108,14 @@ def _unread(file: ConfigFile, values: Values, known: tuple[str, ...]) -> Iterato
             yield file.problem("unknown-key", severity, entry, text, hint, _ROS_FILTER)
 
 
-def _sources(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _sources(file: LintedFile, values: Values) -> Iterator[Problem]:
     for name, entry in values.items():
         match = _OF_SOURCE.fullmatch(name)
         if match is not None and match[2] == "config":
             yield from _fused(file, values, match[1], entry)
 
 
-def _fused(file: ConfigFile, values: Values, source: str, entry: Entry) -> Iterator[Problem]:
+def _fused(file: LintedFile, values: Values, source: str, entry: Entry) -> Iterator[Problem]:
     """What a source is asked for, and whether its messages hold it."""
     flags = re.findall(r"true|false", str(entry.value))
     if source not in values and file.text:
@@ -144,7 +144,7 @@ def _fused(file: ConfigFile, values: Values, source: str, entry: Entry) -> Itera
         yield file.warning("contradiction", both[1], text, "Switch one of them off.", _ROS_FILTER, [both[0]])
 
 
-def _headings(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _headings(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Odometry and an IMU that both say where the robot points to: they drift apart, and the filter jumps."""
     found: dict[str, Entry] = {}
     for name, entry in values.items():
@@ -163,7 +163,7 @@ def _headings(file: ConfigFile, values: Values) -> Iterator[Problem]:
         yield file.note("hinders", imu, text, hint, source, [odom])
 
 
-def _of_filter(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _of_filter(file: LintedFile, values: Values) -> Iterator[Problem]:
     yield from _joined(file, values)
     for name, lengths in _LENGTHS.items():
         entry = values.get(name)
@@ -174,14 +174,14 @@ def _of_filter(file: ConfigFile, values: Values) -> Iterator[Problem]:
     yield from _rate(file, values)
 
 
-def _rate(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _rate(file: LintedFile, values: Values) -> Iterator[Problem]:
     entry = values.get("frequency")
     if entry is not None and entry.number is not None and entry.number <= 0:
         text = f"frequency is {entry.number:g}: nothing is ever published."
         yield file.warning("cannot-work", entry, text, "It must be above 0.", _ROS_FILTER)
 
 
-def _joined(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _joined(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Frames of which two are one, and a world that is none of them."""
     frames = {name: str(entry.value).strip("/") for name in _FRAMES if (entry := values.get(name)) is not None}
     if any(re.search(r"[$<{]", frame) for frame in frames.values()):
@@ -199,7 +199,7 @@ def _joined(file: ConfigFile, values: Values) -> Iterator[Problem]:
         yield file.warning("contradiction", world, text, hint, f"{_ROS_FILTER}; REP 105")
 
 
-def _of_navsat(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _of_navsat(file: LintedFile, values: Values) -> Iterator[Problem]:
     for name in ("magnetic_declination_radians", "yaw_offset"):
         entry = values.get(name)
         if entry is not None and entry.number is not None and abs(entry.number) > _MOST_RADIANS:

@@ -7,7 +7,7 @@ from difflib import SequenceMatcher
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.generic import near
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.scopes import Keys, Scoped, split
 from care_core.metadata import navigation
 from care_core.metadata.navigation import STACKS, Ros
@@ -26,7 +26,7 @@ _PLANNERS = {
 _CLASSES = "the plugin description files of the planners"
 
 
-def check(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+def check(file: LintedFile, result: Scoped) -> Iterator[Problem]:
     """Parts that nobody reads whose name is nearly that of a node, or in ROS 1 a planner, that reads most of them; and
     planners of ROS 1 by a name that their package does not have."""
     yield from _parts(file, result.ros)
@@ -34,7 +34,7 @@ def check(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
         yield from _classes(file)
 
 
-def _parts(file: ConfigFile, ros: Ros) -> Iterator[Problem]:
+def _parts(file: LintedFile, ros: Ros) -> Iterator[Problem]:
     parts: dict[Keys, list[Entry]] = {}
     for entry in file.entries:
         keys = split(entry) if ros == "ros2" else entry.keys
@@ -65,7 +65,7 @@ def _meant(name: str, entries: Sequence[Entry], ros: Ros) -> str:
     return ""
 
 
-def _classes(file: ConfigFile) -> Iterator[Problem]:
+def _classes(file: LintedFile) -> Iterator[Problem]:
     for entry in file.entries:
         known = _PLANNERS.get(entry.keys[-1], ())
         name = str(entry.value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.problems import LintedFile, Problem
 from care_core.lint.readers import Reader, Readers, numbers
 from care_core.lint.scopes import split, words_of
 
@@ -19,7 +19,7 @@ _LEAST = 6
 _SOURCE = "collision_monitor_node.cpp, getPolygons and configureSources"
 
 
-def _types(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _types(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Parts of a type that the node does not know."""
     for reader in held.of(*_NODES):
         for key, known in _TYPES.items():
@@ -32,7 +32,7 @@ def _types(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 yield file.error("not-in-values", entry, text, hint, _SOURCE)
 
 
-def _shapeless(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _shapeless(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Polygons of which nothing says the type, which has no default."""
     for reader in held.of(*_NODES):
         entry = reader.values.get("polygons")
@@ -44,7 +44,7 @@ def _shapeless(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("cannot-work", entry, text, hint, _SOURCE)
 
 
-def _points(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _points(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Polygons with half a corner, or fewer than three."""
     for reader in held.of("Polygon"):
         entry = reader.values.get("points")
@@ -55,7 +55,7 @@ def _points(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.error("cannot-work", entry, text, hint, "polygon.cpp, getParameters")
 
 
-def _unheard(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _unheard(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Sources that a list names and nothing describes, where another is described that no list names."""
     for reader in held.of(*_NODES):
         entry = reader.values.get("observation_sources")
@@ -69,7 +69,7 @@ def _unheard(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("cannot-work", entry, text, f"Is {spare[0]} meant?", _SOURCE)
 
 
-def _around(file: ConfigFile, reader: Reader) -> set[str]:
+def _around(file: LintedFile, reader: Reader) -> set[str]:
     """What stands below a node, by names with dots, whoever reads it."""
     size = len(reader.scope)
     keys = (split(entry) for entry in file.entries)
@@ -80,7 +80,7 @@ def _typed(reader: Reader) -> set[str]:
     return {key.rpartition(".")[0] for key in reader.values if key.endswith(".type")}
 
 
-def _circular(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _circular(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Commands that the monitor hands on to the topic from which it takes them."""
     for reader in held.of("collision_monitor"):
         entry, out = reader.values.get("cmd_vel_in_topic"), reader.values.get("cmd_vel_out_topic")

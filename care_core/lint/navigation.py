@@ -23,7 +23,7 @@ from care_core.lint import (
     sources,
     workable,
 )
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.lint.rules import RESCALED, ROS1_RENAMED, ROS2_ALONE, ROS2_NODES_RENAMED, ROS2_RENAMED, Renamed
 from care_core.lint.scopes import COSTMAP, Place, Scoped, class_of, costmaps, scoped, split
 from care_core.lint.unread import unread
@@ -59,7 +59,7 @@ def distribution_of(target: str, ros: str) -> str:
     raise UsageError(f"No tables for '{target}'.", hint=nearest(target, known), where="--target")
 
 
-def check(file: ConfigFile, target: str) -> Iterator[Problem]:
+def check(file: LintedFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of ROS parameters."""
     result = scoped(file)
     distribution = distribution_of(target, result.ros)
@@ -100,7 +100,7 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     yield from values(file, result)
 
 
-def unknown(file: ConfigFile) -> int:
+def unknown(file: LintedFile) -> int:
     """How many values of a file are of nodes and plugins that nobody here knows: nothing is said of them."""
     judged = {id(entry) for each in localization.nodes(file) if localization.is_of_localization(each)
               for entry in each.values()}  # fmt: skip
@@ -108,7 +108,7 @@ def unknown(file: ConfigFile) -> int:
     return sum(id(entry) not in judged and not slam.is_of_slam(entry) for entry in others)
 
 
-def _no_parameters(file: ConfigFile, result: Scoped) -> Problem | None:
+def _no_parameters(file: LintedFile, result: Scoped) -> Problem | None:
     """A file of something else that names nodes of Nav2: the modes of system_modes, a launch, or values that nodes
     would read, had they the key that ROS 2 asks for."""
     modes = next((one for one in file.entries if _MODES in zip(one.keys, one.keys[1:], strict=False)), None)
@@ -127,7 +127,7 @@ def _no_parameters(file: ConfigFile, result: Scoped) -> Problem | None:
     return file.problem("no-parameters", severity, first, text, hint)
 
 
-def values(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+def values(file: LintedFile, result: Scoped) -> Iterator[Problem]:
     """Values that cannot be meant or cannot work, whatever the release."""
     yield from _contradictions(file, result)
     yield from workable.check(file, result)
@@ -148,7 +148,7 @@ def _likely(result: Scoped, shown: frozenset[str]) -> frozenset[str]:
 
 
 def _place(
-    file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], shown: frozenset[str], *, is_told: bool
+    file: LintedFile, result: Scoped, place: Place, likely: frozenset[str], shown: frozenset[str], *, is_told: bool
 ) -> Iterator[Problem]:
     ros = result.ros
     facts = [fact for owner in place.owners for fact in navigation.known(ros, owner, place.name)]
@@ -176,7 +176,7 @@ def _place(
     yield from _value(file, place.entry, here or facts, ros)
 
 
-def _is_spare(file: ConfigFile, entry: Entry) -> bool:
+def _is_spare(file: LintedFile, entry: Entry) -> bool:
     """Whether a layer that nothing loads is a map's in the local costmap, as Nav2's own files have it since humble."""
     keys = split(entry)
     values = {key[-1]: one.value for one in file.entries if (key := split(one))[:-1] == keys[:-1]}
@@ -185,7 +185,7 @@ def _is_spare(file: ConfigFile, entry: Entry) -> bool:
 
 
 def _other_distribution(
-    file: ConfigFile,
+    file: LintedFile,
     result: Scoped,
     place: Place,
     facts: Sequence[Fact],
@@ -256,7 +256,7 @@ def _dead(result: Scoped, place: Place) -> tuple[str, str] | None:
     return None
 
 
-def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact], ros: str) -> Iterator[Problem]:
+def _value(file: LintedFile, entry: Entry, facts: Sequence[Fact], ros: str) -> Iterator[Problem]:
     """A value that no distribution the file may be for takes."""
     if isinstance(entry.value, str) and _PLACEHOLDER.match(entry.value):
         return
@@ -341,7 +341,7 @@ def _rescaled(fact: Fact, entry: Entry, types: set[str]) -> str:
     return ""
 
 
-def _misnested(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+def _misnested(file: LintedFile, result: Scoped) -> Iterator[Problem]:
     """Costmaps by the name of a node that there is not. What stands there is judged once it is read."""
     for keys, entry in result.misnested.items():
         node = (*keys, keys[-1])
@@ -350,7 +350,7 @@ def _misnested(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
         yield file.warning("misplaced-key", entry, text, hint, _NAMESPACE)
 
 
-def _nodes(file: ConfigFile, releases: frozenset[str], *, is_told: bool) -> Iterator[Problem]:
+def _nodes(file: LintedFile, releases: frozenset[str], *, is_told: bool) -> Iterator[Problem]:
     """Nodes by a name that the file's releases do not have any more, where it has nothing by the new one; where nothing
     says which releases those are, a note.
 
@@ -372,7 +372,7 @@ def _nodes(file: ConfigFile, releases: frozenset[str], *, is_told: bool) -> Iter
         yield file.problem("renamed", severity, nodes[old], text, f"Name it {new}, {also}.", STACKS["ros2"])
 
 
-def _unused(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+def _unused(file: LintedFile, result: Scoped) -> Iterator[Problem]:
     """A radius beside a footprint, which alone counts."""
     scopes = result.scopes()
     for scope in costmaps(result):
@@ -391,7 +391,7 @@ def _unused(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
         yield file.problem("dead-key", severity, radius, f"{text}.", hint, _SHAPE, [footprint])
 
 
-def _contradictions(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+def _contradictions(file: LintedFile, result: Scoped) -> Iterator[Problem]:
     scopes = result.scopes()
     for values in scopes.values():
         yield from contradictions.pairs(file, values, contradictions.ROS_PAIRS)

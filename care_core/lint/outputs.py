@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 
 Values = Mapping[str, Entry]
 
@@ -60,14 +60,14 @@ def _whole(values: Values, name: str) -> int | None:
     return int(number) if number is not None and float(number).is_integer() else None
 
 
-def _warning(file: ConfigFile, entry: Entry, text: str, hint: str, source: str, *others: Entry) -> Problem:
+def _warning(file: LintedFile, entry: Entry, text: str, hint: str, source: str, *others: Entry) -> Problem:
     return file.warning("contradiction", entry, text, hint, source, others)
 
 
 # ArduPilot
 
 
-def ardupilot(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def ardupilot(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Channels, outputs and ports of an ArduPilot vehicle."""
     yield from _sticks(file, values)
     yield from _options(file, values)
@@ -78,7 +78,7 @@ def ardupilot(file: ConfigFile, values: Values) -> Iterator[Problem]:
     yield from _fenced(file, values)
 
 
-def _sticks(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _sticks(file: LintedFile, values: Values) -> Iterator[Problem]:
     mapped = [entry for name, entry in values.items() if name.startswith("RCMAP_") and entry.number]
     for one, other in combinations(mapped, 2):
         if one.number == other.number:
@@ -86,7 +86,7 @@ def _sticks(file: ConfigFile, values: Values) -> Iterator[Problem]:
             yield _warning(file, other, text, "Give each its own channel.", "RCMapper of ArduPilot", one)
 
 
-def _options(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _options(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Two switches of one option, and an option on the channel that chooses the mode: it refuses to arm."""
     found: dict[int, Entry] = {}
     source = "AP_Arming.cpp, rc_arm_checks"
@@ -105,7 +105,7 @@ def _options(file: ConfigFile, values: Values) -> Iterator[Problem]:
                 yield _warning(file, entry, text, "Set one of them to another channel.", source, values[name])
 
 
-def _motors(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _motors(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Motors of a frame that no output drives."""
     outputs = {name: entry for name, entry in values.items() if re.fullmatch(r"SERVO\d+_FUNCTION", name)}
     driven = Counter(int(entry.number or 0) for entry in outputs.values())
@@ -129,7 +129,7 @@ def _motors(file: ConfigFile, values: Values) -> Iterator[Problem]:
         yield _warning(file, entry, text, hint, "AP_MotorsMatrix.cpp, arming_checks: each motor needs an output")
 
 
-def _wheels(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _wheels(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Rovers with half of what steers and drives them."""
     outputs = [entry for name, entry in values.items() if re.fullmatch(r"SERVO\d+_FUNCTION", name)]
     held = {int(entry.number or 0): entry for entry in outputs}
@@ -145,7 +145,7 @@ def _wheels(file: ConfigFile, values: Values) -> Iterator[Problem]:
             yield _warning(file, held[one], text, hint, "AP_MotorsUGV.cpp, pre_arm_check")
 
 
-def _receiver(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _receiver(file: LintedFile, values: Values) -> Iterator[Problem]:
     """A GPS that no port listens to."""
     ports = [entry for name, entry in values.items() if re.fullmatch(r"SERIAL[1-9]_PROTOCOL", name)]
     name = "GPS1_TYPE" if "GPS1_TYPE" in values else "GPS_TYPE"
@@ -157,7 +157,7 @@ def _receiver(file: ConfigFile, values: Values) -> Iterator[Problem]:
         yield _warning(file, values[name], text, hint, "AP_SerialManager: ports are given by their protocol")
 
 
-def _notches(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _notches(file: LintedFile, values: Values) -> Iterator[Problem]:
     for prefix in _NOTCHES:
         centre, width, reference = (values.get(f"{prefix}{name}") for name in ("FREQ", "BW", "REF"))
         if _whole(values, f"{prefix}ENABLE") != 1 or centre is None or width is None:
@@ -173,7 +173,7 @@ def _notches(file: ConfigFile, values: Values) -> Iterator[Problem]:
             yield _warning(file, reference, text, "1 follows it.", "AP_Vehicle.cpp, update_dynamic_notch", mode)
 
 
-def _fenced(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _fenced(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Heights to come home at above the fence: it comes home no higher than that."""
     top, kinds = values.get("FENCE_ALT_MAX"), _whole(values, "FENCE_TYPE")
     if top is None or not top.number or _whole(values, "FENCE_ENABLE") != 1 or kinds is None or not kinds & 1:
@@ -189,7 +189,7 @@ def _fenced(file: ConfigFile, values: Values) -> Iterator[Problem]:
 # PX4
 
 
-def px4(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def px4(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Channels, outputs, ports and height sources of a PX4 vehicle."""
     yield from _px4_channels(file, values)
     yield from _px4_motors(file, values)
@@ -198,7 +198,7 @@ def px4(file: ConfigFile, values: Values) -> Iterator[Problem]:
     yield from _px4_height(file, values)
 
 
-def _px4_channels(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _px4_channels(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Sticks, and switches that arm or kill, that share a channel; modes may share one, by their thresholds."""
     used: dict[float, Entry] = {}
     for name in sorted((one for one in values if _PX4_MAPPED.fullmatch(one)), key=_PX4_ALONE.__contains__):
@@ -211,7 +211,7 @@ def _px4_channels(file: ConfigFile, values: Values) -> Iterator[Problem]:
             yield _warning(file, entry, text, "Give each its own channel.", "rc_update.cpp of PX4", earlier)
 
 
-def _px4_motors(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _px4_motors(file: LintedFile, values: Values) -> Iterator[Problem]:
     outputs = [entry for name, entry in values.items() if _PX4_FUNCTION.fullmatch(name)]
     driven = Counter(int(entry.number or 0) for entry in outputs)
     count = _whole(values, "CA_ROTOR_COUNT") or 0
@@ -231,7 +231,7 @@ def _px4_motors(file: ConfigFile, values: Values) -> Iterator[Problem]:
         yield file.note("contradiction", first, text, hint, source, more)
 
 
-def _px4_rotors(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _px4_rotors(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Rotors of a multicopter that all stand in one line, pairs of them at one place."""
     count = _whole(values, "CA_ROTOR_COUNT") or 0
     if _whole(values, "CA_AIRFRAME") or count < _LEAST_ROTORS:
@@ -252,7 +252,7 @@ def _is_tilted(values: Values, rotor: int) -> bool:
     return any(entry is not None and entry.number for entry in axis)
 
 
-def _px4_ports(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _px4_ports(file: LintedFile, values: Values) -> Iterator[Problem]:
     used: dict[int, Entry] = {}
     for name, entry in values.items():
         port = _whole(values, name)
@@ -264,7 +264,7 @@ def _px4_ports(file: ConfigFile, values: Values) -> Iterator[Problem]:
             yield _warning(file, entry, text, "Give each its own port.", "rc.serial_port of PX4", earlier)
 
 
-def _px4_height(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _px4_height(file: LintedFile, values: Values) -> Iterator[Problem]:
     reference = _whole(values, "EKF2_HGT_REF")
     switch, bit, what = _HEIGHT_SOURCES.get(-1 if reference is None else reference, ("", 0, ""))
     held = _whole(values, switch)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import nearest
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.metadata import navigation
 
 _PARSER = "parse.c of rcl_yaml_param_parser"
@@ -19,7 +19,7 @@ _COSTMAPS = ("local_costmap", "global_costmap")
 _KINDS = {bool: "true or false", int: "an integer", float: "a decimal number", str: "a string"}
 
 
-def check(file: ConfigFile) -> Iterator[Problem]:
+def check(file: LintedFile) -> Iterator[Problem]:
     """Lists of several types, and nodes whose values do not stand below `ros__parameters`."""
     for entry in file.entries:
         if entry.kind == "list" and PARAMETERS in entry.keys[:-1]:
@@ -30,7 +30,7 @@ def check(file: ConfigFile) -> Iterator[Problem]:
     yield from _outside(file)
 
 
-def _quoted(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
+def _quoted(file: LintedFile, entry: Entry) -> Iterator[Problem]:
     """A clock that is told in quotes. What a launch file of Nav2 brings replaces it."""
     word = str(entry.value).lower()
     if not re.search(r"[$<{]", word):
@@ -40,7 +40,7 @@ def _quoted(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
         yield file.warning("wrong-type", entry, text, hint, "time_source.cpp of rclcpp")
 
 
-def _mixed(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
+def _mixed(file: LintedFile, entry: Entry) -> Iterator[Problem]:
     """A list of several types: YAML reads 0 as an integer, and 0.0 as a decimal number."""
     items = _items(str(entry.value))
     kinds = list(dict.fromkeys(_KINDS[type(one)] for one in items if type(one) in _KINDS))
@@ -54,7 +54,7 @@ def _mixed(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
     yield file.error("wrong-type", entry, text, hint, f"{_PARSER}, parse_value")
 
 
-def _nested(file: ConfigFile, entry: Entry) -> Iterator[Problem]:
+def _nested(file: LintedFile, entry: Entry) -> Iterator[Problem]:
     """Lists in a list, such as the corners of a footprint, which Nav2 reads from a text."""
     items = _items(str(entry.value))
     if len(items) > 1 and any(isinstance(one, list) for one in items):
@@ -71,7 +71,7 @@ def _items(text: str) -> list[object]:
     return list(held) if isinstance(held, list) else []
 
 
-def _outside(file: ConfigFile) -> Iterator[Problem]:
+def _outside(file: LintedFile) -> Iterator[Problem]:
     """Nodes of Nav2 that have values beside `ros__parameters`, or not below it, in a file of others that have."""
     done: set[str] = set()
     for entry in file.entries:

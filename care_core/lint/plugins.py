@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.lint.readers import COLLISIONS
 from care_core.lint.rules import ROS2_NODES_RENAMED
 from care_core.lint.scopes import Keys, class_of, split, words_of
@@ -37,7 +37,7 @@ _READS = {
 }
 
 
-def check(file: ConfigFile, distribution: str) -> Iterator[Problem]:
+def check(file: LintedFile, distribution: str) -> Iterator[Problem]:
     """What is wrong with the plugins that a ROS 2 file names.
 
     Args:
@@ -48,7 +48,7 @@ def check(file: ConfigFile, distribution: str) -> Iterator[Problem]:
     yield from _critics(file, values)
 
 
-def shown(file: ConfigFile) -> frozenset[str]:
+def shown(file: LintedFile) -> frozenset[str]:
     """The releases that load every plugin of a file that any release loads; empty where the file names none, or none
     loads all of them."""
     known = _known(_named({split(one): one for one in file.entries}))
@@ -88,7 +88,7 @@ def _since_when_renamed(keys: Keys) -> str:
     return next((since for old, _, since, _ in ROS2_NODES_RENAMED if old == node), "")
 
 
-def _names(file: ConfigFile, named: list[Entry], distribution: str) -> Iterator[Problem]:
+def _names(file: LintedFile, named: list[Entry], distribution: str) -> Iterator[Problem]:
     known: list[tuple[Entry, frozenset[str]]] = []
     for entry in named:
         name = str(entry.value)
@@ -103,7 +103,7 @@ def _names(file: ConfigFile, named: list[Entry], distribution: str) -> Iterator[
         yield from _beside(file, known)
 
 
-def _never(file: ConfigFile, entry: Entry, name: str) -> Iterator[Problem]:
+def _never(file: LintedFile, entry: Entry, name: str) -> Iterator[Problem]:
     """A name that no release has, of a class that there is, or of one that is spelled nearly so."""
     if plugins.package_of(name) not in plugins.packages():
         return
@@ -114,7 +114,7 @@ def _never(file: ConfigFile, entry: Entry, name: str) -> Iterator[Problem]:
         yield file.error("plugin-name", entry, text, hint, plugins.SOURCE)
 
 
-def _elsewhere(file: ConfigFile, entry: Entry, name: str, releases: frozenset[str], distribution: str) -> Problem:
+def _elsewhere(file: LintedFile, entry: Entry, name: str, releases: frozenset[str], distribution: str) -> Problem:
     now = next((one for one, held in plugins.spellings(name).items() if distribution in held), "")
     if now:
         text = f"{name} is {now} in {distribution}, which does not know the other spelling."
@@ -127,7 +127,7 @@ def _elsewhere(file: ConfigFile, entry: Entry, name: str, releases: frozenset[st
     return file.problem("plugin-name", severity, entry, text, hint, plugins.SOURCE)
 
 
-def _beside(file: ConfigFile, known: list[tuple[Entry, frozenset[str]]]) -> Iterator[Problem]:
+def _beside(file: LintedFile, known: list[tuple[Entry, frozenset[str]]]) -> Iterator[Problem]:
     """Names that no one release loads together: those off the releases that load most of them."""
     usual = _usual(releases for _, releases in known)
     for entry, releases in known:
@@ -145,7 +145,7 @@ def _beside(file: ConfigFile, known: list[tuple[Entry, frozenset[str]]]) -> Iter
 # Critics
 
 
-def _critics(file: ConfigFile, values: Mapping[Keys, Entry]) -> Iterator[Problem]:
+def _critics(file: LintedFile, values: Mapping[Keys, Entry]) -> Iterator[Problem]:
     for keys, entry in values.items():
         if keys[-1] != "plugin" or PARAMETERS not in keys:
             continue
@@ -160,7 +160,7 @@ def _critics(file: ConfigFile, values: Mapping[Keys, Entry]) -> Iterator[Problem
             yield from _parts(file, values, here, owner)
 
 
-def _listed(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
+def _listed(file: LintedFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
     """Critics of the other controller in the list of those that are to be loaded."""
     entry = values.get((*here, "critics"))
     if entry is None or (*here, "default_critic_namespaces") in values:
@@ -173,7 +173,7 @@ def _listed(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: s
             yield file.error("plugin-name", entry, text, hint, _LOADS[owner])
 
 
-def _unlisted(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
+def _unlisted(file: LintedFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
     """Parameters of critics that the list does not name, or by another name: once for each critic."""
     entry = values.get((*here, "critics"))
     listed = words_of(entry)
@@ -199,7 +199,7 @@ def _plain(critic: str) -> str:
     return critic.removesuffix("Critic")
 
 
-def _blind(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
+def _blind(file: LintedFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
     """Controllers none of whose critics looks at obstacles. Nothing is said of lists with critics of other packages."""
     entry = values.get((*here, "critics"))
     listed = words_of(entry)
@@ -232,7 +232,7 @@ def _switched_off(values: Mapping[Keys, Entry], here: Keys, owner: str, name: st
     return entry if entry is not None and (entry.number == 0 if owner == _DWB else entry.value == "false") else None
 
 
-def _parts(file: ConfigFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
+def _parts(file: LintedFile, values: Mapping[Keys, Entry], here: Keys, owner: str) -> Iterator[Problem]:
     """Parameters of critics that the controller does not have, once for each critic."""
     seen: set[str] = set()
     listed = words_of(values.get((*here, "critics")))

@@ -60,7 +60,7 @@ class Problem(Record):
     """The other parameters that it takes to be wrong, as the file names them."""
 
 
-class ConfigFile(Record):
+class LintedFile(Record):
     """A configuration file, read as far as it can be."""
 
     path: Path

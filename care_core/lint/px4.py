@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Sequence
 from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.lint.documented import meant_instead, not_listed, share_known, unknown_bits
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.metadata import px4
 from care_core.metadata.fact import Fact
 from care_core.records import replace
@@ -27,7 +27,7 @@ _UNSET = (0.0, -1.0)
 """Values that say "off", "not known" or "not set" of many parameters."""
 
 
-def releases_of(file: ConfigFile, target: str) -> tuple[tuple[str, ...], bool]:
+def releases_of(file: LintedFile, target: str) -> tuple[tuple[str, ...], bool]:
     """The releases that a file may be for, and whether anybody says so.
 
     Args:
@@ -49,7 +49,7 @@ def _header(text: str) -> tuple[str, bool]:
     return (match[1], bool(_EARLY.search(match["build"]))) if match else ("", False)
 
 
-def check(file: ConfigFile, target: str) -> Iterator[Problem]:
+def check(file: LintedFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of PX4's parameters."""
     releases, is_told = releases_of(file, target)
     is_newer = not target and _number(_header(file.text)[0]) > _number(px4.RELEASES[-1])
@@ -63,7 +63,7 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
             yield from _value(file, entry, px4.facts_of(entry.name, releases))
 
 
-def read_as_numbers(file: ConfigFile) -> tuple[ConfigFile, tuple[Problem, ...]]:
+def read_as_numbers(file: LintedFile) -> tuple[LintedFile, tuple[Problem, ...]]:
     """A file without its whole numbers where they were stored byte by byte as decimal ones, as MAVProxy stores those
     of PX4: 1 is then next to 0, and -1 no number."""
     whole = [entry for entry in file.entries if _is_whole(entry.name)]
@@ -87,7 +87,7 @@ def _number(release: str) -> tuple[int, ...]:
     return tuple(map(int, release.split("."))) if release else ()
 
 
-def _unknown(file: ConfigFile, entry: Entry) -> Problem:
+def _unknown(file: LintedFile, entry: Entry) -> Problem:
     meant = meant_instead(entry.name, {one.name for one in file.entries}, px4.names())
     if meant:
         text = f"No release of PX4 from {px4.RELEASES[0]} on has a parameter {entry.name}."
@@ -96,7 +96,7 @@ def _unknown(file: ConfigFile, entry: Entry) -> Problem:
     return file.note("unknown-key", entry, text, "Check its spelling.", _LISTS)
 
 
-def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[str], *, is_told: bool) -> Problem:
+def _elsewhere(file: LintedFile, entry: Entry, releases: Sequence[str], *, is_told: bool) -> Problem:
     """A name of other releases than those the file is for."""
     told = px4.span(releases) if is_told else f"the releases that know most of this file ({px4.span(releases)})"
     new, factor = px4.RENAMED.get(entry.name, ("", 1.0))
@@ -109,7 +109,7 @@ def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[str], *, is_to
     return file.problem("unknown-key", severity, entry, text, "Is the file for this firmware?", _LISTS)
 
 
-def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
+def _value(file: LintedFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
     """A value that no release that the file may be for documents; the default of one always is."""
     value = entry.number
     if value is None or math.isnan(value) or any(value == fact.default_number for fact in facts):

@@ -18,7 +18,7 @@ from care_core.ecosystems.px4.dialect import QGC_PARAMS, is_row
 from care_core.ecosystems.ros import yaml_tree
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.errors import ConfigError
-from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.problems import Entry, LintedFile, Problem, Severity
 from care_core.lint.rules import BY_ID
 
 _PARAMETER = re.compile(r"\s*([^\s,]+)(?:\s*,\s*|\s+)(\S+)")
@@ -33,7 +33,7 @@ _GROUPS = "groups"
 Named = tuple[tuple[str, ...], str, str]
 
 
-def read_file(path: Path, namespace: str = "") -> tuple[ConfigFile, tuple[Problem, ...]]:
+def read_file(path: Path, namespace: str = "") -> tuple[LintedFile, tuple[Problem, ...]]:
     """A file, and what stands in the way of reading it.
 
     Raises:
@@ -48,14 +48,14 @@ def read_file(path: Path, namespace: str = "") -> tuple[ConfigFile, tuple[Proble
     except ConfigError as err:
         line = int(number) if (number := err.where.rpartition(":")[2]).isdigit() else 1
         problem = syntax(path, line, 1, "", err.message, err.hint)
-        return ConfigFile(path, format, text, (), (), namespace), (problem,)
+        return LintedFile(path, format, text, (), (), namespace), (problem,)
     entries: list[Entry] = []
     named: list[Named] = []
     if root is not None:
         _walk(root, (), entries, named, letters=format is ROS2_YAML)
     held = tuple(entry for entry in entries if not _is_too_large(entry))
     problems = tuple(_too_large(path, one.line, one.column, one.name) for one in entries if _is_too_large(one))
-    return ConfigFile(path, format, text, held, tuple(named), namespace), problems
+    return LintedFile(path, format, text, held, tuple(named), namespace), problems
 
 
 def _is_too_large(entry: Entry) -> bool:
@@ -103,7 +103,7 @@ def _text(node: Node) -> str:
     return str(node.value) if isinstance(node, ScalarNode) else ""
 
 
-def _of_parameters(path: Path, format: Dialect, text: str) -> tuple[ConfigFile, tuple[Problem, ...]]:
+def _of_parameters(path: Path, format: Dialect, text: str) -> tuple[LintedFile, tuple[Problem, ...]]:
     entries, problems = [], []
     lines = text.splitlines()
     pair = _command if any(_COMMAND.match(line) for line in lines) else _pair
@@ -134,7 +134,7 @@ def _of_parameters(path: Path, format: Dialect, text: str) -> tuple[ConfigFile, 
             problems.append(_too_large(path, number, column, name))
             continue
         entries.append(Entry((name,), held, number, column, kind))
-    return ConfigFile(path, format, text, tuple(entries)), tuple(problems)
+    return LintedFile(path, format, text, tuple(entries)), tuple(problems)
 
 
 def _conflict(path: Path, line: int) -> Problem:

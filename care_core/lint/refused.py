@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 
 from care_core.lint.contradictions import reach
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.readers import Readers, readers
 from care_core.lint.scopes import COSTMAP, Scoped
 from care_core.metadata.navigation import spanned
@@ -24,7 +24,7 @@ _BARE = re.compile(r"[\w.-]+\.xml")
 """A file's name without a folder, and without anything that a launch file replaces."""
 
 
-def check(file: ConfigFile, result: Scoped, likely: frozenset[str]) -> Iterator[Problem]:
+def check(file: LintedFile, result: Scoped, likely: frozenset[str]) -> Iterator[Problem]:
     """Reversing that the controller switches off as it may turn in place.
 
     Args:
@@ -40,7 +40,7 @@ def check(file: ConfigFile, result: Scoped, likely: frozenset[str]) -> Iterator[
             yield file.warning("contradiction", entry, text, "Switch one of them off.", source, others)
 
 
-def _trees(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _trees(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Behavior trees by a file's name alone: it is opened where the node was started, not where Nav2 keeps its own."""
     for reader in held.of("bt_navigator"):
         for name in _TREES:
@@ -51,7 +51,7 @@ def _trees(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 yield file.warning("cannot-work", entry, text, hint, "bt_action_server_impl.hpp, loadBehaviorTree")
 
 
-def _shapes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _shapes(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Footprints of less than three corners, in whose place the radius counts."""
     for reader in held.of(COSTMAP):
         entry = reader.values.get("footprint")
@@ -61,7 +61,7 @@ def _shapes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("cannot-work", entry, text, "Give it all of its corners.", "footprint.cpp of costmap_2d")
 
 
-def _far(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _far(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Robots of the size of a house."""
     for reader in held.of(COSTMAP):
         footprint, radius = reader.values.get("footprint"), reader.values.get("robot_radius")

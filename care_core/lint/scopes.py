@@ -8,7 +8,7 @@ from pathlib import Path
 
 from care_core.ecosystems.ros.dialect import ROS1_YAML, ROS2_YAML
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.problems import ConfigFile, Entry
+from care_core.lint.problems import Entry, LintedFile
 from care_core.metadata import navigation
 from care_core.metadata.navigation import Ros
 from care_core.records import Struct, field
@@ -84,7 +84,7 @@ def class_of(text: str) -> str:
     return re.split(r"::|/", text)[-1]
 
 
-def as_file(parameters: Mapping[str, Setting], path: Path, *, is_ros2: bool) -> ConfigFile:
+def as_file(parameters: Mapping[str, Setting], path: Path, *, is_ros2: bool) -> LintedFile:
     """The parameters of a run as a file of them, in their order; a value of the log has no line."""
     entries = []
     for name, one in parameters.items():
@@ -94,7 +94,7 @@ def as_file(parameters: Mapping[str, Setting], path: Path, *, is_ros2: bool) -> 
             keys = (*keys, PARAMETERS, *own.split("."))
         line = one.source.rpartition(":")[2]
         entries.append(Entry(keys, one.value, int(line) if line.isdigit() else 0, 1, _kind(one.value)))
-    return ConfigFile(path, ROS2_YAML if is_ros2 else ROS1_YAML, "", tuple(entries))
+    return LintedFile(path, ROS2_YAML if is_ros2 else ROS1_YAML, "", tuple(entries))
 
 
 def _kind(value: float | str) -> str:
@@ -103,7 +103,7 @@ def _kind(value: float | str) -> str:
     return "int" if isinstance(value, int) else "float"
 
 
-def scoped(file: ConfigFile) -> Scoped:
+def scoped(file: LintedFile) -> Scoped:
     """Who reads what of a ROS file."""
     return _ros2(file) if file.format is ROS2_YAML else _ros1(file)
 
@@ -118,7 +118,7 @@ def words_of(entry: Entry | None) -> tuple[str, ...]:
 # ROS 2
 
 
-def _ros2(file: ConfigFile) -> Scoped:
+def _ros2(file: LintedFile) -> Scoped:
     result = Scoped("ros2")
     values = {split(entry): entry for entry in file.entries}
     unloaded: set[Keys] = set()
@@ -142,7 +142,7 @@ def _ros2(file: ConfigFile) -> Scoped:
     return result
 
 
-def _is_costmap(file: ConfigFile, node: Keys) -> bool:
+def _is_costmap(file: LintedFile, node: Keys) -> bool:
     """Whether a costmap has that name: it stands in a namespace of its own name. A pattern may mean any."""
     name = (*(part for part in file.namespace.split("/") if part), *node)
     return any("*" in part for part in name) or name[-2:-1] == name[-1:]
@@ -210,7 +210,7 @@ def _unloaded(keys: Keys, at: int, owners: Keys, values: Mapping[Keys, Entry]) -
 # ROS 1
 
 
-def _ros1(file: ConfigFile) -> Scoped:
+def _ros1(file: LintedFile) -> Scoped:
     result = Scoped("ros1")
     values = {entry.keys: entry for entry in file.entries}
     parts: dict[Keys, list[Entry]] = {}
@@ -241,7 +241,7 @@ def _is_layer(entries: Sequence[Entry]) -> bool:
 
 
 def _reader(
-    file: ConfigFile,
+    file: LintedFile,
     keys: Keys,
     owners: Mapping[Keys, Keys],
     parts: Mapping[Keys, list[Entry]],

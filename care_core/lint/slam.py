@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import nearest
 from care_core.lint.generic import near
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 
 _NODE = re.compile(r"\w*slam_toolbox\w*")
 _DECIMALS = (
@@ -47,7 +47,7 @@ _COMMON = "slam_toolbox_common.cpp"
 Values = Mapping[str, Entry]
 
 
-def check(file: ConfigFile) -> Iterator[Problem]:
+def check(file: LintedFile) -> Iterator[Problem]:
     """What is wrong with the node of SLAM toolbox that a file of ROS 2 holds."""
     found: dict[str, dict[str, Entry]] = {}
     for entry in file.entries:
@@ -68,7 +68,7 @@ def is_of_slam(entry: Entry) -> bool:
     return PARAMETERS in keys[1:-1] and bool(_NODE.fullmatch(keys[keys.index(PARAMETERS) - 1]))
 
 
-def _names(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _names(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Names that are a slip of the pen, and whole numbers: releases and forks add names of their own."""
     known = (*_DECIMALS, *_OTHERS)
     for name, entry in values.items():
@@ -83,7 +83,7 @@ def _names(file: ConfigFile, values: Values) -> Iterator[Problem]:
             yield file.error("wrong-type", entry, text, f"Write {entry.number:g}.0.", _COMMON)
 
 
-def _words(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _words(file: LintedFile, values: Values) -> Iterator[Problem]:
     """Words of which it knows a few; solvers of another package it takes as well."""
     mode, solver = values.get("mode"), values.get("solver_plugin")
     if mode is not None and mode.kind == "str" and mode.value not in _MODES and "$" not in str(mode.value):
@@ -99,7 +99,7 @@ def _words(file: ConfigFile, values: Values) -> Iterator[Problem]:
         yield file.error("plugin-name", solver, text, hint, "solver_plugins.xml")
 
 
-def _map(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _map(file: LintedFile, values: Values) -> Iterator[Problem]:
     """A map with an ending: the node adds its own."""
     entry = values.get("map_file_name")
     stem, dot, ending = str(entry.value).rpartition(".") if entry is not None else ("", "", "")
@@ -111,7 +111,7 @@ def _map(file: ConfigFile, values: Values) -> Iterator[Problem]:
         yield file.warning("cannot-work", entry, text, hint, "serialization.hpp of slam_toolbox")
 
 
-def _frames(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _frames(file: LintedFile, values: Values) -> Iterator[Problem]:
     seen: dict[str, Entry] = {}
     for name in _FRAMES:
         entry = values.get(name)
@@ -124,7 +124,7 @@ def _frames(file: ConfigFile, values: Values) -> Iterator[Problem]:
             seen[frame] = entry
 
 
-def _numbers(file: ConfigFile, values: Values) -> Iterator[Problem]:
+def _numbers(file: LintedFile, values: Values) -> Iterator[Problem]:
     period, heading = values.get("transform_publish_period"), values.get("minimum_travel_heading")
     if period is not None and period.number == 0:
         text = "transform_publish_period is 0: it never tells where odom is on the map."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.readers import CONTROLLERS, TOP_SPEEDS, Readers, numbers
 from care_core.lint.scopes import class_of
 
@@ -31,7 +31,7 @@ _SAME = 0.9
 _AXES = "Give it 3, for x, y and the turn; since lyrical all five lists may have 6."
 
 
-def _smoothed(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _smoothed(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """A smoother that lets nothing through."""
     top = held.one(CONTROLLERS, TOP_SPEEDS)
     for reader in held.of("velocity_smoother"):
@@ -51,7 +51,7 @@ def _smoothed(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("contradiction", entry, text, "Lower it.", "velocity_smoother.cpp", [top])
 
 
-def _vectors(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _vectors(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Lists of the velocity smoother that it refuses: of another length, or with the wrong sign."""
     for reader in held.of("velocity_smoother"):
         lists = {name: one for name in _VECTORS if (one := reader.values.get(name)) is not None and numbers(one)}
@@ -75,7 +75,7 @@ def _count(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
-def _slower(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _slower(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """A smoother that lets through less than the controller plans with."""
     for reader in held.of("velocity_smoother"):
         entry = reader.values.get("max_velocity")
@@ -101,7 +101,7 @@ def _one(held: Readers, names: Mapping[str, Sequence[str]]) -> Entry | None:
     return found[0] if found and len({one.number for one in found}) == 1 else None
 
 
-def _backwards(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _backwards(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """A smoother that lets nothing through backwards, though the controller may drive so."""
     for reader in held.of("velocity_smoother"):
         entry = reader.values.get("min_velocity")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.ecosystems.ros.dialect import ROS2_YAML
-from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.problems import LintedFile, Problem
 from care_core.lint.readers import OBSTACLES, Reader, Readers, readers
 from care_core.lint.scopes import Scoped, words_of
 from care_core.metadata.navigation import spanned
@@ -15,7 +15,7 @@ _PRIVATE = spanned("foxy-jazzy", "ros2")
 """Since kilted a relative topic is one of the robot's namespace (obstacle_layer.cpp, joinWithParentNamespace)."""
 
 
-def _heights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _heights(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Sources that keep no point above the frame's own height. Nav2 takes 0.0 m where nothing is written, ROS 1 2.0 m.
 
     Of a file alone: a robot that drove shows by its costmap whether its laser lies at that height, as some simulated
@@ -48,7 +48,7 @@ def _first(reader: Reader, name: str) -> str | None:
     return next((key for key in reader.values if key.startswith(f"{name}.")), None)
 
 
-def check(file: ConfigFile, result: Scoped, likely: frozenset[str]) -> Iterator[Problem]:
+def check(file: LintedFile, result: Scoped, likely: frozenset[str]) -> Iterator[Problem]:
     """Topics that are others by the namespace of the costmap, which launch files of several robots remap (a note), and
     lists where Nav2 reads a text.
 
@@ -65,7 +65,7 @@ def check(file: ConfigFile, result: Scoped, likely: frozenset[str]) -> Iterator[
             yield from _relative(file, reader, name)
 
 
-def _relative(file: ConfigFile, reader: Reader, name: str) -> Iterator[Problem]:
+def _relative(file: LintedFile, reader: Reader, name: str) -> Iterator[Problem]:
     entry = reader.values.get(f"{name}.topic")
     topic = "" if entry is None else str(entry.value)
     costmap = next((key for key in reader.scope if "costmap" in key), "")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.lint.clashes import Clash, check
-from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.problems import LintedFile, Problem
 from care_core.lint.readers import Readers
 
 _TEB = "TebLocalPlannerROS"
@@ -44,7 +44,7 @@ CLASHES: tuple[Clash, ...] = (
 )  # fmt: skip
 
 
-def _clashes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _clashes(file: LintedFile, held: Readers) -> Iterator[Problem]:
     for reader in held.of(_TEB):
         yield from check(file, {name.rpartition(".")[2]: one for name, one in reader.values.items()}, CLASHES)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from difflib import SequenceMatcher
 
-from care_core.lint.problems import ConfigFile, Problem
+from care_core.lint.problems import LintedFile, Problem
 from care_core.lint.rules import LEFTOVERS, MEANT, PAIRED, PAIRED_SOURCE, Leftover, Paired
 from care_core.lint.scopes import COSTMAP, Keys, Place, Scoped, class_of, split, words_of
 from care_core.metadata import navigation
@@ -29,7 +29,7 @@ _SEARCHED = frozenset({
 
 
 def unread(
-    file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], shown: frozenset[str]
+    file: LintedFile, result: Scoped, place: Place, likely: frozenset[str], shown: frozenset[str]
 ) -> Problem | None:
     """A name that its reader reads in no release.
 
@@ -57,7 +57,7 @@ def unread(
     return file.warning("unknown-key", place.entry, text, hint, STACKS[result.ros])
 
 
-def _paired(file: ConfigFile, result: Scoped, place: Place, paired: Paired) -> Problem | None:
+def _paired(file: LintedFile, result: Scoped, place: Place, paired: Paired) -> Problem | None:
     """The lists by which eloquent loads plugins, once for both."""
     beside = {one.name: one.entry for one in result.places if one.scope == place.scope}
     held = [name for name in (paired.names, paired.classes) if name in beside]
@@ -77,7 +77,7 @@ def _paired(file: ConfigFile, result: Scoped, place: Place, paired: Paired) -> P
     return file.warning("renamed", place.entry, text, hint, PAIRED_SOURCE, others)
 
 
-def _have_classes(file: ConfigFile, scope: Keys, names: Sequence[str]) -> bool:
+def _have_classes(file: LintedFile, scope: Keys, names: Sequence[str]) -> bool:
     """Whether each of these parts says which class it is of."""
     held = {split(entry) for entry in file.entries}
     return bool(names) and all((*scope, name, "plugin") in held for name in names)
@@ -145,7 +145,7 @@ def _others(result: Scoped, place: Place, likely: frozenset[str]) -> list[str]:
     return [one for one in found if _is_read(result, one, place.name, likely)] or found
 
 
-def _misplaced(file: ConfigFile, result: Scoped, place: Place, others: Sequence[str]) -> Problem | None:
+def _misplaced(file: LintedFile, result: Scoped, place: Place, others: Sequence[str]) -> Problem | None:
     """A name that others read and that is plainly theirs."""
     text = f"{place.owners[0]} does not read {place.name}"
     if targets := _targets(result, place, others):
@@ -192,7 +192,7 @@ def _lacks(result: Scoped, owner: str, name: str) -> bool:
     return bool({one.scope for one in parts} - {one.scope for one in parts if one.name == name})
 
 
-def _leftover(file: ConfigFile, place: Place, leftover: Leftover) -> Problem | None:
+def _leftover(file: LintedFile, place: Place, leftover: Leftover) -> Problem | None:
     """A name that Nav2's own files hold as well: wrong only where what counts is another value."""
     values = {split(entry): entry for entry in file.entries}
     parts = [

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from care_core.lint.contradictions import inscribed_radius
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.readers import COLLISIONS, SAMPLED, Reader, Readers
 from care_core.lint.scopes import COSTMAP, words_of
 
@@ -28,7 +28,7 @@ class Reach(NamedTuple):
     """Whether the longer side is what counts."""
 
 
-def window(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def window(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Local costmaps that are too small for the robot, its look-ahead or its trajectories."""
     for reader in held.of(COSTMAP):
         if not any("local_costmap" in key for key in reader.scope):

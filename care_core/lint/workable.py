@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from care_core.lint import critics, docks, frames, layers, monitor, refused, smoother, sources, teb, window
 from care_core.lint.contradictions import inscribed_radius
-from care_core.lint.problems import ConfigFile, Entry, Problem
+from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.lint.readers import (
     CHECKERS,
     COLLISIONS,
@@ -146,7 +146,7 @@ OFF: tuple[Off, ...] = (
 )  # fmt: skip
 
 
-def check(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+def check(file: LintedFile, result: Scoped) -> Iterator[Problem]:
     """Values with which a robot cannot do its work, or hardly."""
     held = readers(result)
     for reader in held:
@@ -156,7 +156,7 @@ def check(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
         yield from rule(file, held)
 
 
-def _above(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
+def _above(file: LintedFile, reader: Reader) -> Iterator[Problem]:
     for rule in ABOVE:
         if not reader.is_a(*rule.owners) or reader.is_off(rule.unless_off):
             continue
@@ -177,7 +177,7 @@ def _is_of_source(key: str) -> bool:
     return key.endswith(".max_obstacle_height")
 
 
-def _off(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
+def _off(file: LintedFile, reader: Reader) -> Iterator[Problem]:
     for rule in OFF:
         if reader.is_a(*rule.owners) and reader.is_off(rule.name):
             entry = reader.values[rule.name]
@@ -195,7 +195,7 @@ def _rate(held: Readers) -> Entry | None:
     return entry if entry is not None and entry.number is not None and entry.number > 0 else None
 
 
-def _simulated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _simulated(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Trajectories shorter than a control step."""
     rate = _rate(held)
     for reader in held.of(*SAMPLED) if rate is not None else ():
@@ -206,7 +206,7 @@ def _simulated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("contradiction", entry, text, hint, "the trajectory generators", [rate])
 
 
-def _predicted(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _predicted(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Steps of MPPI shorter than a control step."""
     rate = _rate(held)
     hz = 0.0 if rate is None or rate.number is None else rate.number
@@ -221,7 +221,7 @@ def _predicted(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("cannot-work", entry, text, hint, "optimizer.cpp, setOffset", [rate])
 
 
-def _considered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _considered(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """A footprint that MPPI is told to consider and nobody draws."""
     local = [one for one in held.of(COSTMAP) if any("local_costmap" in key for key in one.scope)]
     if not local or any(one.has_footprint() for one in local):
@@ -236,7 +236,7 @@ def _considered(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 yield file.warning("cannot-work", switch, text, hint, "cost_critic.cpp, obstacles_critic.cpp")
 
 
-def _weights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _weights(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Shares of what a laser sees that are more than all of it."""
     for reader in held.of("amcl"):
         for name in ("z_hit", "z_short", "z_max", "z_rand", "laser_z_hit", "laser_z_short", "laser_z_max",
@@ -248,7 +248,7 @@ def _weights(file: ConfigFile, held: Readers) -> Iterator[Problem]:
                 yield file.warning("out-of-range", entry, text, hint, "the laser models of amcl weigh by it")
 
 
-def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _settles(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Tolerances that the smallest step of a turn leaps over."""
     rate = _rate(held)
     for reader in held.of("DWAPlannerROS", "TrajectoryPlannerROS"):
@@ -266,7 +266,7 @@ def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("contradiction", entry, text, "The robot turns to and fro.", source, [slowest, rate])
 
 
-def _starts(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _starts(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Least speeds that no acceleration reaches within a control step."""
     rate = _rate(held)
     for reader in held.of("DWAPlannerROS"):
@@ -286,7 +286,7 @@ def _starts(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("contradiction", ahead, text, "Raise them or lower the least speeds.", source, others)
 
 
-def _progress(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _progress(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Progress that is asked for faster than the robot may drive."""
     top = held.one((*PLANNERS, *CONTROLLERS), TOP_SPEEDS)
     names = (
@@ -306,7 +306,7 @@ def _progress(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("contradiction", reader.values[time], text, "Give it more time.", source, others)
 
 
-def _cells(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _cells(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Cells larger than the robot or than the tolerance of its goals."""
     for reader in held.of(COSTMAP):
         cell, radius = (
@@ -330,7 +330,7 @@ def _cells(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("hinders", entry, text, hint, _TOLERANCE, [cell])
 
 
-def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _sizes(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """One robot of two sizes."""
     sized = []
     for reader in held.of(COSTMAP):
@@ -353,7 +353,7 @@ def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("contradiction", entry, text, "Give both the same.", source, others)
 
 
-def _goal_checks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _goal_checks(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """A controller that turns at the goal before the goal checker counts it as there."""
     checker = held.one(CHECKERS, ("xy_goal_tolerance",))
     for reader in held.of("DWBLocalPlanner") if checker is not None else ():
@@ -368,7 +368,7 @@ def _goal_checks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("contradiction", checker, text, hint, "dwb_critics, rotate_to_goal.cpp", [entry])
 
 
-def _unknown_space(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _unknown_space(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Planners that keep to known space, of which there is none."""
     costmap = next((one for one in held.of(COSTMAP) if any("global_costmap" in key for key in one.scope)), None)
     if costmap is None or not words_of(costmap.values.get("plugins")) or costmap.is_off("track_unknown_space"):
@@ -384,7 +384,7 @@ def _unknown_space(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         yield file.warning("contradiction", entry, text, "Allow it.", "the planners keep to known cells", others)
 
 
-def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _drawn(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Planners that nothing draws to the goal."""
     for reader in held.of("DWAPlannerROS", "TrajectoryPlannerROS"):
         names = ("goal_distance_bias", "path_distance_bias")
@@ -394,7 +394,7 @@ def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
             yield file.warning("cannot-work", entries[0], text, "Raise them.", "dwa_planner.cpp", entries[1:])
 
 
-def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+def _clocks(file: LintedFile, held: Readers) -> Iterator[Problem]:
     """Nodes of one robot on two clocks."""
     entries = [one.values["use_sim_time"] for one in held if "use_sim_time" in one.values]
     off = [one for one in entries if one.value == "false"]
@@ -405,7 +405,7 @@ def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
         yield file.warning("contradiction", entry, text, "Give all the same.", source)
 
 
-RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
+RULES_OF_SEVERAL: tuple[Callable[[LintedFile, Readers], Iterator[Problem]], ...] = (
     _simulated, _predicted, _considered, _settles, _starts, _progress, window.window, _cells, _sizes, *layers.RULES,
     _goal_checks, _unknown_space, _drawn, _weights, *docks.RULES, *teb.RULES, *smoother.RULES, *monitor.RULES,
     *critics.RULES, *frames.RULES, *sources.RULES, *refused.RULES, _clocks,

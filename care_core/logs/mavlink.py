@@ -44,7 +44,7 @@ from care_core.logs.mavlink_packets import (
 from care_core.numbers import Floats
 from care_core.run import Damage, Setting
 
-_HEARTBEAT, _PARAM_VALUE, _STATUSTEXT, _AUTOPILOT_VERSION = 0, 22, 253, 148
+_HEARTBEAT = 0
 _TYPE_GCS, _AUTOPILOT_NONE, _AUTOPILOT_ARDUPILOT, _AUTOPILOT_PX4 = 6, 8, 3, 12
 _STATION_COMPONENT = 190
 """MAVProxy writes the parameters that it fetched as a file into its log as if this component had sent them."""

@@ -19,7 +19,7 @@ TABLE = Path(__file__).with_name("screening.tsv")
 _OF_LIFT = "Q_"
 
 
-class Flight(Record):
+class ScreeningFlight(Record):
     """One flight with everything at its reference but one parameter."""
 
     reference: float
@@ -37,7 +37,7 @@ def plain_refusal(text: str) -> str:
     return re.sub(r"[\d.]+", "#", text.casefold()).strip()
 
 
-def flights_of(name: str, kind: str) -> tuple[Flight, ...]:
+def flights_of(name: str, kind: str) -> tuple[ScreeningFlight, ...]:
     """The screening flights of a parameter on a kind of vehicle; empty where it was not screened."""
     return tuple(map(_flight, _lines().get((name, letter_of(kind)), ())))
 
@@ -61,10 +61,10 @@ def _lines() -> Mapping[tuple[str, str], tuple[str, ...]]:
 
 
 @cache
-def _flight(cells: str) -> Flight:
+def _flight(cells: str) -> ScreeningFlight:
     reference, value, first, others, refusals = cells.split("\t")
     early, later, why = _signs(first), _signs(others), frozenset(filter(None, refusals.split("; ")))
-    return Flight(float(reference), float(value), bool(early), early, early | later, why)
+    return ScreeningFlight(float(reference), float(value), bool(early), early, early | later, why)
 
 
 def _signs(text: str) -> frozenset[Sign]:

@@ -61,7 +61,10 @@ def _section(ecosystem: Ecosystem) -> Iterator[str]:
 
 
 def _reads(check: Check[Any]) -> str:
-    return ", ".join(f"`{name}`" for name in check.reads) or "the whole log"
+    return (
+        ", ".join(f"`{name}`" for name in check.reads)
+        or "what is read of every log: modes, events, messages, parameters"
+    )
 
 
 def _value(limit: Limit) -> str:

@@ -32,7 +32,7 @@ def finding_sentence(finding: FindingEntry) -> str:
     return f"{finding.title}, at {log_time(finding.onset_s)}{late}.{f' {shown_by}.' if shown_by else ''}{led}"
 
 
-def account_lines(
+def timeline_lines(
     account: Sequence[Event | EventEntry],
     findings: Sequence[Finding | FindingEntry] = (),
     robot: str = "",

@@ -23,7 +23,7 @@ from care_core.report.entries import (
     event_entries,
     finding_entries,
 )
-from care_core.report.health import account_lines, finding_lines
+from care_core.report.health import finding_lines, timeline_lines
 from care_core.report.published import Document, publish
 from care_core.run import Damage, Fit, MissionInfo, ProfileChoice, place_of_damage
 from care_core.text import WIDTH, clean, log_time, wrapped
@@ -253,7 +253,7 @@ def inspection_text(document: InspectDocument) -> str:
         *wrapped(fit_text("" if document.fit.verdict == "no" else fitting, document.fit)),
         *(["", *findings] if findings else []),
         "",
-        *account_lines(document.account, most=len(document.account)),
+        *timeline_lines(document.account, most=len(document.account)),
     ]
     return "\n".join(lines) + "\n\n" + holdings_text(document)
 

@@ -27,7 +27,7 @@ _HOST = "localhost"
 """Likewise a host; whose computer it was is nobody's business."""
 
 
-class Case(Record):
+class JUnitCase(Record):
     """An objective, with what is to be said of it where it did not pass."""
 
     name: str
@@ -40,7 +40,7 @@ class Suite(Record):
     """A log."""
 
     name: str
-    cases: tuple[Case, ...]
+    cases: tuple[JUnitCase, ...]
     properties: tuple[tuple[str, str], ...] = ()
     seconds: float = 0.0
     timestamp: str = _NO_CLOCK
@@ -57,9 +57,9 @@ def suite_of(report: Report) -> Suite:
     worst = [one for one in noted(report.findings) if one.severity == "critical" and not one.after_impact]
     if worst:
         told = "\n".join(finding_sentence(one) for one in worst)
-        cases.append(Case("findings", "failure", "; ".join(one.title for one in worst), told))
+        cases.append(JUnitCase("findings", "failure", "; ".join(one.title for one in worst), told))
     if not cases:
-        cases.append(Case("run", "skipped", report.verdict.failed))
+        cases.append(JUnitCase("run", "skipped", report.verdict.failed))
     robot = next((one.text for one in report.account if one.kind == "vehicle"), "")
     firmware = (("robot", robot),) if robot else ()
     times = log_times([one.time_s for one in report.account])
@@ -81,16 +81,16 @@ def suite_of(report: Report) -> Suite:
 
 def unreadable(log: str, reason: str) -> Suite:
     """The suite of a log that could not be read."""
-    return Suite(Path(log).name, (Case("log", "error", reason, reason),))
+    return Suite(Path(log).name, (JUnitCase("log", "error", reason, reason),))
 
 
-def _case(one: ObjectiveEntry, report: Report) -> Case:
+def _case(one: ObjectiveEntry, report: Report) -> JUnitCase:
     if one.status == "ok":
-        return Case(one.name)
+        return JUnitCase(one.name)
     if one.status == "not_evaluated":
-        return Case(one.name, "skipped", one.reason or "not evaluated")
+        return JUnitCase(one.name, "skipped", one.reason or "not evaluated")
     fault = next((fault for fault in report.faults if fault.objective == one.name), None)
-    return Case(one.name, "failure", one.sentence, "\n".join(_why(one, fault, report)))
+    return JUnitCase(one.name, "failure", one.sentence, "\n".join(_why(one, fault, report)))
 
 
 def _why(one: ObjectiveEntry, fault: FaultEntry | None, report: Report) -> list[str]:

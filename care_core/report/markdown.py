@@ -31,8 +31,6 @@ _MOST_LINES, _MOST_CHARACTERS = 40, 500
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~])")
 _LINKS = re.compile(r"(?<=:)(?=//)|(?<=www)(?=\.)", re.IGNORECASE)
 
-Section = list[str]
-
 
 def to_markdown(report: Report) -> str:
     """A report to paste into a ticket. Where it would be too long, its last parts are left out, and that is said."""

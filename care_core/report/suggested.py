@@ -11,9 +11,10 @@ from pathlib import Path
 
 from care_core.diagnose.outside.change import outside_option
 from care_core.ecosystems.ros.plugin_names import is_named_alike
-from care_core.ecosystems.vehicles import Kind, aliases_of
+from care_core.ecosystems.vehicles import Kind
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import ConfigError, nearest
+from care_core.metadata.aliases import aliases_of
 from care_core.metadata.ardupilot import known_in
 from care_core.metadata.causal_map import Role, meaning_of
 from care_core.metadata.navigation import mended

@@ -11,7 +11,7 @@ from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode, told_in_full
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
-from care_core.report.health import EVENTS_SHOWN, account_lines, finding_lines, reason_lines, telling
+from care_core.report.health import EVENTS_SHOWN, finding_lines, reason_lines, telling, timeline_lines
 from care_core.report.shared_causes import together
 from care_core.report.wording import below
 from care_core.run import Evidence, Value, gathered, is_known, place_of_damage
@@ -34,7 +34,7 @@ def to_text(diagnosis: Diagnosis) -> str:
         _verdict(verdict),
         reason_lines(verdict.reasons),
         finding_lines(health.findings) if health.timeline or health.findings else (),
-        account_lines(health.timeline, health.findings, health.robot),
+        timeline_lines(health.timeline, health.findings, health.robot),
         _origin(diagnosis),
         _missions(diagnosis),
         _objectives(diagnosis),

@@ -10,13 +10,13 @@ from care_core.diagnose.records import ObjectiveResult
 from care_core.diagnose.verdict import STATUS_WORDS, beside
 from care_core.diagnose.verify import (
     NOT_HELD,
-    Before,
     Made,
     MadeChange,
     ObjectiveCheck,
     Outcome,
-    Promise,
     PromisedSet,
+    ReportedObjective,
+    ReportedPromise,
     Verification,
     VerifyVerdict,
 )
@@ -121,7 +121,7 @@ class VerifyDocument(Document, kw_only=True):
     notes: list[str]
 
 
-def promise_of(report: TriageDocument, schema: Schema, path: Path) -> Promise:
+def promise_of(report: TriageDocument, schema: Schema, path: Path) -> ReportedPromise:
     """What a report said and promised of the parameters of its profile.
 
     Raises:
@@ -131,13 +131,13 @@ def promise_of(report: TriageDocument, schema: Schema, path: Path) -> Promise:
     if report.fix is None:
         why = report.abstained or "every objective was within its threshold"
         raise UsageError(f"The report suggests no change, so nothing was promised: {clean(why)}.")
-    return Promise(
+    return ReportedPromise(
         sha256=report.log.sha256,
         start=report.log.start,
         version=profile_of(report).version,
         config={name: float(value) for name, value in report.config.items()},
         objectives={
-            one.name: Before(
+            one.name: ReportedObjective(
                 one.value,
                 one.status,
                 Threshold(one.threshold.op, one.threshold.value) if one.threshold else None,

@@ -9,7 +9,7 @@ from care_tui.workspace import Workspace
 
 _CLASSES = {
     "logs": "LogsPage",
-    "log": "AccountPage",
+    "log": "LogPage",
     "objectives": "ObjectivesPage",
     "causes": "CausesPage",
     "fix": "FixPage",
@@ -24,7 +24,6 @@ _CLASSES = {
     "missions": "MissionsPage",
     "profiles": "ProfilesPage",
 }
-_MODULES = {"log": "account"}
 
 
 def make_page(name: str, workspace: Workspace, id: str) -> Page:
@@ -34,5 +33,5 @@ def make_page(name: str, workspace: Workspace, id: str) -> Page:
 
 def page_class(name: str) -> type[Page]:
     """The class of that page."""
-    found: type[Page] = getattr(import_module(f"care_tui.pages.{_MODULES.get(name, name)}"), _CLASSES[name])
+    found: type[Page] = getattr(import_module(f"care_tui.pages.{name}"), _CLASSES[name])
     return found

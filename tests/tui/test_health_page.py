@@ -9,7 +9,7 @@ from care_core.diagnose.records import Diagnosis, Hypothesis, MissionVerdict
 from care_core.ecosystems.findings import WHOLE_LOG, Finding, Health
 from care_core.progress import Progress
 from care_core.records import replace
-from care_core.run import Check, Fit, MissionInfo
+from care_core.run import Fit, MissionInfo, OutcomeCheck
 from care_tui.app import CareApp
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
@@ -67,7 +67,7 @@ async def test_that_nothing_was_found_is_said_plainly(make_app: MakeApp) -> None
 async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_say_why_they_are_empty(
     make_app: MakeApp, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("care_tui.pages.account.what_would_fit", lambda _case: ["for arducopter: record CMD"])
+    monkeypatch.setattr("care_tui.pages.log.what_would_fit", lambda _case: ["for arducopter: record CMD"])
     app = make_app(sample.unfitting())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
@@ -104,7 +104,7 @@ async def test_what_a_run_without_a_profile_did_is_judged_and_one_without_a_miss
         assert text(app).startswith(
             "No profile fits this log (it is a rover, the profile is of a copter), so no change"
         )
-    plain = replace(sample.all_ok(), run=replace(sample.RUN, checks=(Check("no_crash", 1.0, ""),)))
+    plain = replace(sample.all_ok(), run=replace(sample.RUN, checks=(OutcomeCheck("no_crash", 1.0, ""),)))
     app = make_app(plain)
     async with app.run_test(size=(80, 24)) as pilot:
         for step in "45":

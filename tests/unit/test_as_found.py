@@ -7,15 +7,15 @@ import pytest
 from care_core.diagnose.as_found import as_found
 from care_core.ecosystems.findings import CAME_DOWN, Finding, FindingKind
 from care_core.records import replace
-from care_core.run import Check, MissionInfo, Run, Unavailable, Value
+from care_core.run import MissionInfo, OutcomeCheck, Run, Unavailable, Value
 from tests.made import made_run
 
 CRASH = Finding("crash", "it crashed", 100.0, 100.0, "critical", "", "")
 CHECKS = (
-    Check("took_off", 1.0, "it left the ground"),
-    Check("mission_success", 1.0, "every waypoint was reached"),
-    Check("no_crash", 1.0, "the autopilot reported no crash"),
-    Check("landed", 1.0, "it was on the ground at the end"),
+    OutcomeCheck("took_off", 1.0, "it left the ground"),
+    OutcomeCheck("mission_success", 1.0, "every waypoint was reached"),
+    OutcomeCheck("no_crash", 1.0, "the autopilot reported no crash"),
+    OutcomeCheck("landed", 1.0, "it was on the ground at the end"),
 )
 
 

@@ -10,7 +10,7 @@ from care_core.ecosystems.findings import NOTHING_SEEN, Finding
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import replace
-from care_core.run import Check, Evidence, Run
+from care_core.run import Evidence, OutcomeCheck, Run
 from care_core.variables import Role, Threshold, Variable
 from tests.planted import SCHEMA, TIME, planted_run, with_variable
 
@@ -95,7 +95,7 @@ def test_what_is_no_good_run_is_refused_with_its_reason(planted: Profile) -> Non
     assert refusal(judged(failed, planted), NOTHING_SEEN) == "success was not met: Crash: Disarming"
     cut = replace(run, mission=replace(run.mission, ended=False))
     assert "ends before" in refusal(judged(cut, planted), NOTHING_SEEN)
-    plain = replace(run, checks=(Check("armed", 1.0, "it armed"),))
+    plain = replace(run, checks=(OutcomeCheck("armed", 1.0, "it armed"),))
     assert refusal(judged(plain, planted), NOTHING_SEEN) == "no mission was flown"
     finding = Finding("motor", "motor 1 gave too little thrust", 3.0, 9.0, "critical", "seen", "RCOU")
     assert "motor 1" in refusal(judged(run, planted), replace(NOTHING_SEEN, findings=(finding,)))

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
+from benchmarks.peers import PlainClassifier, largest_deviation
+from care_core.learn.bug_isolation import cooperative_bug_isolation
 from tests.planted import DEFAULTS, OPTIONS, SCHEMA, fly_many
 
 NAMES = [o.name for o in OPTIONS]

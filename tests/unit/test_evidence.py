@@ -258,7 +258,7 @@ def test_messages_that_differ_in_numbers_alone_are_told_once_with_their_count() 
 
 def test_what_a_run_says_stands_in_order_of_time() -> None:
     late, early = Evidence(9.0, "late", "message"), Evidence(2.0, "early", "found")
-    assert replace(planted_run(), evidence=(late,)).hearing(early).evidence == (early, late)
+    assert replace(planted_run(), evidence=(late,)).with_evidence(early).evidence == (early, late)
 
 
 def test_how_many_parameters_differ_is_told_of_the_options_alone(planted: Profile) -> None:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.diagnose.estimates import UNMODELLED
-from care_core.diagnose.hypotheses import UNTOLD_BY_FIT, hypotheses_of, unasked, with_findings
+from care_core.diagnose.hypotheses import UNTOLD_BY_FIT, hypotheses_of, hypotheses_without_model, with_findings
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, NoisyOr
 from care_core.diagnose.parts import OUTLASTED
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
@@ -138,39 +138,39 @@ def test_a_pack_that_a_flight_outlasts_needs_no_part_that_failed() -> None:
         missed("no_failsafe", "battery failsafe at 234.6 s"),
         replace(finding(0.9, "warning"), kind="compass", title="compass 2 is disturbed"),
     )
-    assert lead(unasked([compass], missed=(failsafe,))) == ("world", OUTLASTED)
-    assert lead(unasked([compass], missed=(failsafe, missed())))[0] == "hardware"
+    assert lead(hypotheses_without_model([compass], missed=(failsafe,))) == ("world", OUTLASTED)
+    assert lead(hypotheses_without_model([compass], missed=(failsafe, missed())))[0] == "hardware"
     motor = finding(0.9)
-    assert lead(unasked([motor], missed=(failsafe,)))[0] == "hardware"
+    assert lead(hypotheses_without_model([motor], missed=(failsafe,)))[0] == "hardware"
     sags = replace(finding(0.25), kind="battery", title=SAGS)
-    assert lead(unasked([sags, compass], missed=(failsafe,))) == ("world", OUTLASTED)
+    assert lead(hypotheses_without_model([sags, compass], missed=(failsafe,))) == ("world", OUTLASTED)
     drained = replace(finding(0.9), kind="battery", title=UNCHARGED)
-    assert lead(unasked([drained, compass], missed=(failsafe,))) == ("hardware", UNCHARGED)
+    assert lead(hypotheses_without_model([drained, compass], missed=(failsafe,))) == ("hardware", UNCHARGED)
 
 
 def test_without_a_model_only_a_failure_is_explained() -> None:
-    assert unasked([finding(0.9, "warning")]) == ()
-    assert lead(unasked([finding(0.9, "warning")], missed=(missed(),)))[0] == "hardware"
-    assert lead(unasked([finding(0.9)])) == ("hardware", "motor 2 lost thrust")
+    assert hypotheses_without_model([finding(0.9, "warning")]) == ()
+    assert lead(hypotheses_without_model([finding(0.9, "warning")], missed=(missed(),)))[0] == "hardware"
+    assert lead(hypotheses_without_model([finding(0.9)])) == ("hardware", "motor 2 lost thrust")
 
 
 def test_where_nothing_else_failed_a_critical_finding_is_explained_by_what_may_have_brought_it_about() -> None:
     sags = replace(finding(0.4), kind="battery", title=SAGS)
     shaken = replace(finding(0.9, "warning"), kind="vibration", title="strong vibration")
-    assert lead(unasked([sags, shaken])) == ("hardware", SAGS)
+    assert lead(hypotheses_without_model([sags, shaken])) == ("hardware", SAGS)
     failed_imu = replace(finding(0.4), kind="imu", title="gyro 1 failed")
-    assert lead(unasked([failed_imu, shaken])) == ("hardware", shaken.title)
+    assert lead(hypotheses_without_model([failed_imu, shaken])) == ("hardware", shaken.title)
 
 
 def test_a_critical_finding_names_its_options_where_no_objective_has_a_value() -> None:
     swings = Finding("tuning", "the steering oscillates", 30.0, 220.0, "critical", "", "", "parameter", 0.85)
     shown = {swings.title: Evidence(30.0, "the steering oscillates", "found", options=("P", "FF"))}
-    found = unasked([swings], shown=shown, verdict="fits")
+    found = hypotheses_without_model([swings], shown=shown, verdict="fits")
     assert {one.name for one in found[:2]} == {"P", "FF"}
     assert found[0].acts == pytest.approx(found[1].acts)
     assert found[0].probability > 0.35
-    assert lead(unasked([swings]))[0] != "parameter", "without the rule it names none"
-    assert unasked([replace(swings, severity="warning")], shown=shown, verdict="fits") == ()
+    assert lead(hypotheses_without_model([swings]))[0] != "parameter", "without the rule it names none"
+    assert hypotheses_without_model([replace(swings, severity="warning")], shown=shown, verdict="fits") == ()
 
 
 def test_what_the_operator_did_counts_as_met() -> None:
@@ -181,7 +181,7 @@ def test_what_no_signal_shows_has_a_share_of_its_own() -> None:
     found = {(one.what, one.name): one.probability for one in weigh({"a": 0.5}, 0.1, ())}
     assert found["parameter", ""] > 0.01
     for verdict, share in UNTOLD_BY_FIT.items():
-        shown = unasked([finding(0.9)], verdict=verdict)
+        shown = hypotheses_without_model([finding(0.9)], verdict=verdict)
         rest = next(one for one in shown if one.what == "chance")
         assert rest.name == "chance, or what no log shows"
         assert 0.1 * share < rest.probability < share

@@ -27,7 +27,7 @@ from care_core.report.document import build_document, remembered_verdict
 from care_core.report.reading import remembered
 from care_core.report.terminal import to_text
 from care_core.report.writers import published
-from care_core.run import Check, Damage, Evidence, Setting
+from care_core.run import Damage, Evidence, OutcomeCheck, Setting
 from tests.made import made_diagnosis, made_run
 
 AGAIN = "run the same configuration again: if it fails again, the cause persists"
@@ -56,7 +56,9 @@ def test_messages_and_checks_tell_of_an_upset_as_well() -> None:
     run = replace(made_run(), evidence=())
     assert not was_upset(run, [LATE])
     assert was_upset(replace(run, evidence=(Evidence(60.0, "Potential Thrust Loss (3)", "thrust"),)), ())
-    assert was_upset(replace(run, checks=(Check("no_crash", 0.0, "no crash", "the failure detector acted"),)), ())
+    assert was_upset(
+        replace(run, checks=(OutcomeCheck("no_crash", 0.0, "no crash", "the failure detector acted"),)), ()
+    )
 
 
 def test_what_was_not_upset_runs_again() -> None:

@@ -18,7 +18,7 @@ from care_core.ecosystems.measures import Mission
 from care_core.profile.reading import read_schema
 from care_core.records import replace
 from care_core.report.terminal import to_text
-from care_core.run import Check, MissionInfo, Unavailable, Value, is_known
+from care_core.run import MissionInfo, OutcomeCheck, Unavailable, Value, is_known
 from tests.made import made_diagnosis, made_run
 from tests.tables import read
 from tests.unit.test_ardupilot_extract import HOME, KIND, METRES, flight, north, table, value
@@ -169,7 +169,7 @@ def test_an_option_is_no_suspect_where_no_mode_read_it() -> None:
 
 def test_checks_are_judged_and_withhold_what_a_mission_would_mean() -> None:
     schema = read_schema(PROFILE)
-    plain = (Check("no_crash", 0.0, "no crash"), Check("landed", Unavailable("the log ends"), "landed"))
+    plain = (OutcomeCheck("no_crash", 0.0, "no crash"), OutcomeCheck("landed", Unavailable("the log ends"), "landed"))
     objectives: dict[str, Value] = {
         "mission_success": Unavailable("no mission was flown"), "mission_time": 61.0, "energy": 3.0,
     }  # fmt: skip
@@ -189,7 +189,7 @@ def test_several_missions_are_listed_with_their_verdicts() -> None:
     unflown: dict[str, Value] = {one.name: Unavailable("no mission was flown") for one in schema.objectives}
     for index, crashed in enumerate((1.0, 0.0), start=1):
         one = replace(run, mission=MissionInfo(index, 2, 100.0 * index, 100.0 * index + 50, ended=True, fits=True),
-                      checks=(Check("no_crash", crashed, ""),), objectives=unflown)  # fmt: skip
+                      checks=(OutcomeCheck("no_crash", crashed, ""),), objectives=unflown)  # fmt: skip
         missions.append(verdict(judge(one, schema, None)))
     shown = to_text(replace(made_diagnosis(), missions=tuple(missions)))
     assert "   1  NOT EVALUATED, 100 s (1:40) to 150 s (2:30): no mission was flown" in shown, "as its own report"

@@ -23,7 +23,7 @@ from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import Record, Struct, field, replace
 from care_core.run import FITS, Damage, Fit, Run, Setting
-from care_core.run import Check as RunCheck
+from care_core.run import OutcomeCheck as RunCheck
 from care_core.variables import Role, Variable
 from tests.planted import planted_run
 

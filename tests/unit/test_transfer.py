@@ -11,7 +11,7 @@ from care_core.causal.mechanisms import Mechanism
 from care_core.errors import LearningError
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import inputs_of
-from care_core.learn.transfer import carry_over, out_of_support, started_from, update
+from care_core.learn.transfer import out_of_support, started_from, transfer_to, update
 from care_core.profile.model import read_model, write_model
 from care_core.profile.store import Profile
 from care_core.records import replace
@@ -37,7 +37,7 @@ def test_target_runs_bring_the_prediction_to_the_target(planted: Profile, name: 
     graph, rng = planted.model.graph, np.random.default_rng(0)
     errors = [error(planted.model.mechanisms, test, name)]
     for runs in (few, many):
-        _, mechanisms = carry_over(planted.model, SCHEMA, runs, graph, rng)
+        _, mechanisms = transfer_to(planted.model, SCHEMA, runs, graph, rng)
         errors.append(error(mechanisms, test, name))
     assert errors[0] > 1.5 * errors[1] > 1.5 * 0.9 * errors[2]
 
@@ -59,9 +59,9 @@ def test_an_updated_model_survives_the_disk_and_answers_the_same(planted: Profil
 
 def test_updating_twice_keeps_the_whole_history(planted: Profile, tmp_path: Path) -> None:
     graph, rng = planted.model.graph, np.random.default_rng(0)
-    _, once = carry_over(planted.model, SCHEMA, heavier(fly_many(60, seed=8)), graph, rng)
+    _, once = transfer_to(planted.model, SCHEMA, heavier(fly_many(60, seed=8)), graph, rng)
     first = replace(planted.model, mechanisms=once)
-    _, twice = carry_over(first, SCHEMA, heavier(fly_many(60, seed=9)), graph, rng)
+    _, twice = transfer_to(first, SCHEMA, heavier(fly_many(60, seed=9)), graph, rng)
     write_model(replace(planted.model, mechanisms=twice), tmp_path)
     prior = read_model(tmp_path).mechanisms["time"].prior
     assert prior is not None
@@ -93,14 +93,14 @@ def slower(frame: pd.DataFrame) -> pd.DataFrame:
 
 def test_ten_runs_tell_what_they_have_in_common(planted: Profile) -> None:
     test, few = slower(fly_many(150, seed=7)), slower(fly_many(10, seed=8))
-    _, mechanisms = carry_over(planted.model, SCHEMA, few, planted.model.graph, np.random.default_rng(0))
+    _, mechanisms = transfer_to(planted.model, SCHEMA, few, planted.model.graph, np.random.default_rng(0))
     assert error(mechanisms, test, "time") < 0.6 * error(planted.model.mechanisms, test, "time")
 
 
 @pytest.mark.parametrize("runs", [4, 10, 30])
 def test_runs_of_the_same_robot_hardly_move_it(planted: Profile, runs: int) -> None:
     test, few = fly_many(150, seed=7), fly_many(runs, seed=8)
-    _, mechanisms = carry_over(planted.model, SCHEMA, few, planted.model.graph, np.random.default_rng(0))
+    _, mechanisms = transfer_to(planted.model, SCHEMA, few, planted.model.graph, np.random.default_rng(0))
     for name in ("time", "energy"):
         assert error(mechanisms, test, name) < 1.15 * error(planted.model.mechanisms, test, name)
 
@@ -120,7 +120,7 @@ def test_with_few_runs_the_source_keeps_its_graph_and_its_support(planted: Profi
 
 
 def test_what_the_source_does_not_know_a_carried_mechanism_does_not_know_either(planted: Profile) -> None:
-    _, mechanisms = carry_over(
+    _, mechanisms = transfer_to(
         planted.model, SCHEMA, slower(fly_many(10, seed=8)), planted.model.graph, np.random.default_rng(0)
     )
     carried, source = mechanisms["time"], planted.model.mechanisms["time"]

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.vehicles import (
-    alias_in,
-    aliases_of,
     error_kind,
     error_words,
     event_words,
     mode_name,
     mode_number,
     motors_of,
-    renamed,
     vehicle_of,
     way_of,
 )
@@ -26,7 +23,7 @@ from care_core.ecosystems.vehicles.modes import px4_mode
 from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.logs.ardupilot import Built, dataflash_facts, facts_of
 from care_core.logs.base import Table
-from care_core.metadata.aliases import _chains
+from care_core.metadata.aliases import _chains, alias_in, aliases_of, renamed
 from care_core.run import Setting
 
 QUAD_X = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0}

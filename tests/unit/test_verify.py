@@ -16,7 +16,7 @@ import care_core
 from care_core.configs.driven import same_value
 from care_core.diagnose.judging import judge
 from care_core.diagnose.records import Diagnosis, Need
-from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, _notes, verify
+from care_core.diagnose.verify import PromisedSet, ReportedObjective, ReportedPromise, Verification, _notes, verify
 from care_core.ecosystems.findings import Finding, Health, Severity
 from care_core.errors import ConfigError
 from care_core.records import replace
@@ -33,16 +33,16 @@ SLOW = {**DEFAULTS, "speed": 2.0}
 PROMISED = PromisedSet({"speed": (2.0, 5.0)}, 0.9, {"time": (130.0, 150.0), "energy": (12.0, 20.0)})
 
 
-def promise(*others: PromisedSet) -> Promise:
-    return Promise(
+def promise(*others: PromisedSet) -> ReportedPromise:
+    return ReportedPromise(
         sha256="",
         start=None,
         version="1",
         config=SLOW,
         objectives={
-            "success": Before(1.0, "ok", SUCCESS.threshold),
-            "time": Before(230.0, "fault", TIME.threshold),
-            "energy": Before(15.0, "ok", ENERGY.threshold),
+            "success": ReportedObjective(1.0, "ok", SUCCESS.threshold),
+            "time": ReportedObjective(230.0, "fault", TIME.threshold),
+            "energy": ReportedObjective(15.0, "ok", ENERGY.threshold),
         },
         sets=(PROMISED, *others),
     )
@@ -128,7 +128,7 @@ def test_a_move_within_what_runs_differ_by_is_none(time_s: float, outcome: str) 
 
 def test_a_longer_mission_is_held_against_what_it_needs_itself() -> None:
     """The mission that failed was given up half-way: the reference needed 60 s for it, and 120 s for the next."""
-    half = {"time": Before(None, "not_evaluated", Threshold("<=", 87.5), need=60.0)}
+    half = {"time": ReportedObjective(None, "not_evaluated", Threshold("<=", 87.5), need=60.0)}
     within = replace(PROMISED, intervals={"time": (65.0, 75.0)})
     judged = triaged(planted_run(speed=5.0))
     time = next(result for result in judged.objectives if result.variable is TIME)
@@ -174,7 +174,9 @@ def asking(
     run = replace(run, mission=replace(run.mission, asked=((what, asked),)))
     said = replace(promise(), context={what: before})
     if lost:
-        said = replace(said, objectives={**said.objectives, "success": Before(0.0, "fault", SUCCESS.threshold)})
+        said = replace(
+            said, objectives={**said.objectives, "success": ReportedObjective(0.0, "fault", SUCCESS.threshold)}
+        )
     return verify(said, triaged(run), schema)
 
 
@@ -265,7 +267,7 @@ def test_a_run_that_triage_calls_lost_has_not_recovered() -> None:
 
 
 def test_objectives_that_the_report_leaves_out_count_too() -> None:
-    fast = replace(promise(), objectives={"success": Before(1.0, "ok", SUCCESS.threshold)})
+    fast = replace(promise(), objectives={"success": ReportedObjective(1.0, "ok", SUCCESS.threshold)})
     found = verify(fast, triaged(planted_run(speed=5.0, planner=2.0)), SCHEMA)
     assert found.verdict == "not_fixed"
     assert "time" in found.sentence
@@ -280,7 +282,7 @@ def test_a_run_that_no_profile_fits_or_that_has_no_objective_cannot_be_told() ->
 
 def test_a_reports_own_limit_counts_where_it_is_stricter_only() -> None:
     def with_limit(bound: float, run: Run, *given: str) -> Verification:
-        time = Before(230.0, "fault", Threshold("<=", bound))
+        time = ReportedObjective(230.0, "fault", Threshold("<=", bound))
         said = promise()
         return verify(replace(said, objectives={**said.objectives, "time": time}), triaged(run), SCHEMA, given)
 

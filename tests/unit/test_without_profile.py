@@ -25,7 +25,7 @@ from care_core.report.document import build_document
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
-from care_core.run import Check, Unavailable, Value, is_known
+from care_core.run import OutcomeCheck, Unavailable, Value, is_known
 from tests.nav2_drive import recorded
 from tests.rewritten import write_text
 from tests.ros_drives import STATUS, Drive
@@ -41,7 +41,7 @@ PX4 = MISSION_KINDS["px4_flight"]
 SAMPLES = Path(__file__).parents[2] / "samples"
 
 
-def checks(found: tuple[Check, ...]) -> dict[str, Value]:
+def checks(found: tuple[OutcomeCheck, ...]) -> dict[str, Value]:
     return {check.name: check.value for check in found}
 
 

@@ -16,7 +16,7 @@ from care_core.diagnose.outside.off import OffParameter
 from care_core.diagnose.outside.signs import Signs
 from care_core.diagnose.records import OutsideSuspect
 from care_core.metadata.causal_map import Meaning, Read, Role, Sign
-from care_core.metadata.screening import Flight, flights_of
+from care_core.metadata.screening import ScreeningFlight, flights_of
 from care_core.run import Run, shown
 from care_core.text import listed
 
@@ -84,7 +84,7 @@ def _just_missing(acting: Iterable[OffParameter], signs: Signs, kind: str) -> It
             yield _suspect(one, weight, "")
 
 
-def _farthest(one: OffParameter, flights: Sequence[Flight]) -> float:
+def _farthest(one: OffParameter, flights: Sequence[ScreeningFlight]) -> float:
     """How far a value is on the way to the farthest that was flown, at most 1."""
     reference = flights[0].reference
     side = [flight for flight in flights if (flight.value - reference) * (one.value - reference) > 0]
@@ -139,7 +139,7 @@ _SWITCHES: Mapping[Read, str] = {
 """The parameter that has something used at all."""
 
 
-def _wrong(one: OffParameter, flights: Sequence[Flight], blocks: Mapping[Role, int]) -> float:
+def _wrong(one: OffParameter, flights: Sequence[ScreeningFlight], blocks: Mapping[Role, int]) -> float:
     """Probability that this value loses such a mission."""
     share = _lost(one, flights) if flights else UNSCREENED.get(one.meaning.role, 0.0)
     if one.is_out_of_range:
@@ -152,7 +152,7 @@ def _wrong(one: OffParameter, flights: Sequence[Flight], blocks: Mapping[Role, i
     return factor * share / (factor * share + 1.0 - share) if share < 1.0 else share
 
 
-def _lost(one: OffParameter, flights: Sequence[Flight]) -> float:
+def _lost(one: OffParameter, flights: Sequence[ScreeningFlight]) -> float:
     """Probability that the value loses a mission, by the screening flights: at its value, or as much of the way to the
     bound that was lost as it is off, to that of the other side where this one was not flown."""
     reference = flights[0].reference
@@ -167,12 +167,12 @@ def _lost(one: OffParameter, flights: Sequence[Flight]) -> float:
     return max(HARMLESS, *(way * is_lost for way, is_lost in ways))
 
 
-def _at(one: OffParameter, flights: Sequence[Flight]) -> list[Flight]:
+def _at(one: OffParameter, flights: Sequence[ScreeningFlight]) -> list[ScreeningFlight]:
     """The flights with this very value."""
     return [flight for flight in flights if math.isclose(flight.value, one.value, rel_tol=1e-4, abs_tol=1e-6)]
 
 
-def _way(value: float, flight: Flight) -> float:
+def _way(value: float, flight: ScreeningFlight) -> float:
     """How far a value is on the way from the reference to the one that was flown."""
     ends = sorted((abs(flight.value), abs(flight.reference)))
     if flight.value * flight.reference > 0 and ends[1] > MANY * ends[0] and value * flight.value > 0:
@@ -180,13 +180,13 @@ def _way(value: float, flight: Flight) -> float:
     return (value - flight.reference) / (flight.value - flight.reference)
 
 
-def _share(flights: Sequence[Flight]) -> float:
+def _share(flights: Sequence[ScreeningFlight]) -> float:
     """Share that was lost, as seen in so few: Jeffreys' estimate."""
     lost = sum(flight.is_lost for flight in flights)
     return (lost + 0.5) / (len(flights) + 1.0) if lost else HARMLESS
 
 
-def _is_alike(flight: Flight, signs: Signs) -> bool:
+def _is_alike(flight: ScreeningFlight, signs: Signs) -> bool:
     """Whether a run failed as a flight did: for the same refusal, or the first signs of each are among those of the
     other."""
     if signs.refusals or flight.refusals:
@@ -194,7 +194,9 @@ def _is_alike(flight: Flight, signs: Signs) -> bool:
     return bool(flight.first & signs.every) and bool(signs.first & flight.every)
 
 
-def _shows(one: OffParameter, flights: Sequence[Flight], like: Sequence[Flight], signs: Signs) -> float:
+def _shows(
+    one: OffParameter, flights: Sequence[ScreeningFlight], like: Sequence[ScreeningFlight], signs: Signs
+) -> float:
     """Probability that a mission which the parameter loses fails in this way, by flights and by the causal map where
     nobody flew the value, or not with such a frame."""
     lost = sum(flight.is_lost for flight in flights)
@@ -211,7 +213,7 @@ def _answers(meaning: Meaning, signs: Signs) -> float:
     return MAY_ANSWER if meaning.signs & signs.every else 0.0
 
 
-def _flown(value: float, like: Sequence[Flight]) -> str:
+def _flown(value: float, like: Sequence[ScreeningFlight]) -> str:
     """Which flights failed as this run did: those with its value, else with the nearest ones."""
     if not like:
         return ""

@@ -75,7 +75,7 @@ class ArduPilot(Ecosystem):
         return ARDUPILOT_PARAM
 
     def robots(self, log: Log) -> Iterator[Robot]:
-        from care_core.ecosystems.vehicles.identity import robots
+        from care_core.ecosystems.vehicle_identity import robots
 
         return robots(log)
 

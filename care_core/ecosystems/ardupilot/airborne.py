@@ -45,7 +45,8 @@ _TAKEOFF_S = 15.0
 """A take-off takes no longer."""
 _LIFTING = 0.2
 """Throttle above which a copter is about to lift; MOT_SPIN_MIN and what armed motors idle at is below."""
-AIRBORNE_M = 1.0
+OFF_GROUND_M = 1.0
+"""Height above which a copter touches nothing, whatever its legs."""
 _GROUND_M = 2.0
 _STRIVING, _STRANDED_S = 0.5, 10.0
 """Throttle that lifts any vehicle that can fly, and how long it may take to do so."""
@@ -118,7 +119,7 @@ class Airborne(Armed):
         up = np.zeros(len(t), dtype=bool)
         if height is not None:
             for rows in pieces(len(t)):
-                up[rows] = np.interp(t[rows], *height) > AIRBORNE_M
+                up[rows] = np.interp(t[rows], *height) > OFF_GROUND_M
         if throttle is not None:
             up &= throttle[1] > 0.02
             if height is None:
@@ -374,7 +375,7 @@ class Airborne(Armed):
                 yield Hit(at, fell, f"it came down at {fell:.1f} m/s into a blow of {blow:.0f} m/s^2")
                 return
             if flew > _FAST_MS and blow > 2 * _SHOCK and is_still:
-                is_high = self.height is not None and float(np.interp(at, *self.height)) > AIRBORNE_M
+                is_high = self.height is not None and float(np.interp(at, *self.height)) > OFF_GROUND_M
                 said = f"a blow of {blow:.0f} m/s^2 stopped it dead from {flew:.1f} m/s"
                 yield Hit(at, flew, said, "something" if is_high else "the ground")
                 return

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from care_core.ecosystems.ardupilot import airborne, armed, recorded, sources
-from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M, FOLLOWED_DEG, Airborne
+from care_core.ecosystems.ardupilot.airborne import FOLLOWED_DEG, OFF_GROUND_M, Airborne
 from care_core.ecosystems.ardupilot.battery import Battery
 from care_core.ecosystems.ardupilot.instances import FIX
 from care_core.ecosystems.ardupilot.one_run import OneRun, windows_of
@@ -94,7 +94,7 @@ class Flight(Airborne):
         tilt, error, height = self.tilt, self.lean_error, self.height
         if tilt is None or error is None or height is None:
             return ()
-        leans = (np.interp(moved.t, *tilt) > _LEANS_DEG) & (np.interp(moved.t, *height) > AIRBORNE_M)
+        leans = (np.interp(moved.t, *tilt) > _LEANS_DEG) & (np.interp(moved.t, *height) > OFF_GROUND_M)
         leans &= np.interp(moved.t, *error) < FOLLOWED_DEG
         leans &= during(self.flown, moved.t) & (moved["Status"] >= FIX)
         stands = leans & (moved["Spd"] < STANDS_MS) & (moved.t > self.first_blow_s)

@@ -69,7 +69,7 @@ class Px4(Ecosystem):
         return Recording((), {"SDLOG_MODE": 1, "SDLOG_PROFILE": 1}, remarks)
 
     def robots(self, log: Log) -> Iterator[Robot]:
-        from care_core.ecosystems.vehicles.identity import robots
+        from care_core.ecosystems.vehicle_identity import robots
 
         return robots(log)
 

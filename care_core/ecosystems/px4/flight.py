@@ -23,6 +23,7 @@ from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
 from care_core.ecosystems.px4.calibration import is_calibration, usual
 from care_core.ecosystems.spans import Span, within
 from care_core.ecosystems.vehicles import is_simulated
+from care_core.ecosystems.vehicles.way import AIRBORNE_M
 from care_core.logs.base import Log, Table, Wanted
 from care_core.numbers import Bools
 from care_core.records import replace
@@ -46,10 +47,8 @@ ROTARY, ROVER = 1, 3
 """vehicle_type of what hovers and of a rover (vehicle_status.msg: VEHICLE_TYPE_ROTARY_WING, VEHICLE_TYPE_ROVER)."""
 TERMINATION = 13
 """nav_state in which the firmware has ended the flight (vehicle_status.msg)."""
-AIRBORNE_M = 2.0
 BARELY_M = 0.5
 """Rise below which a vehicle never left the ground."""
-"""Height above where it was armed from which it flew."""
 SAID_WITHIN_S = 1.0
 """Topics are published at their own times: what belongs to an event may come so much after it."""
 

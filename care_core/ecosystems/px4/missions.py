@@ -16,7 +16,6 @@ from care_core.ecosystems.px4.checks.kill_switch import killed_aloft_s
 from care_core.ecosystems.px4.failsafes import READS as FAILSAFES
 from care_core.ecosystems.px4.failsafes import in_words
 from care_core.ecosystems.px4.flight import (
-    AIRBORNE_M,
     BARELY_M,
     LANDED,
     MESSAGES,
@@ -33,9 +32,10 @@ from care_core.ecosystems.px4.measures.shortfall import evidence, shortfall
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.ecosystems.vehicles.arming import CUT
+from care_core.ecosystems.vehicles.way import AIRBORNE_M
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.records import replace
-from care_core.run import Check, Evidence, Unavailable, Value
+from care_core.run import Evidence, OutcomeCheck, Unavailable, Value
 from care_core.text import log_time
 
 _SOON_S = 1.0
@@ -76,16 +76,16 @@ class Px4Missions(MissionKind):
     def is_decided(self, mission: Mission) -> bool:
         return mission.ended or any(one(mission) is not None for one in (lost_s, failsafe_s, halted))
 
-    def checks(self, mission: Mission) -> tuple[Check, ...]:
+    def checks(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         return () if not is_armed(mission) or flew_automatically(mission) else self.outcome(mission)
 
     def span(self, mission: Mission, phase: str) -> tuple[float, float] | None:
         span = span_of_phase(mission, {"phase": phase})
         return None if isinstance(span, Unavailable) else span
 
-    def outcome(self, mission: Mission) -> tuple[Check, ...]:
+    def outcome(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         if not is_armed(mission):
-            return (Check("armed", 0.0, "the vehicle armed", "arming was refused"),)
+            return (OutcomeCheck("armed", 0.0, "the vehicle armed", "arming was refused"),)
         return tuple(_checks(_flight(mission.model), (mission.start_s, mission.end_s), ended=mission.ended))
 
     def modes(self, mission: Mission) -> tuple[str, ...]:
@@ -101,24 +101,24 @@ def _flight(model: RunModel) -> Px4Flight:
     return model
 
 
-def _checks(flight: Px4Flight, span: Span, *, ended: bool) -> Iterator[Check]:
-    yield Check("armed", 1.0, "the vehicle armed")
+def _checks(flight: Px4Flight, span: Span, *, ended: bool) -> Iterator[OutcomeCheck]:
+    yield OutcomeCheck("armed", 1.0, "the vehicle armed")
     flies = flight.last(STATUS, "vehicle_type", span[1]) != ROVER
     if flies:
-        yield Check("took_off", _took_off(flight, span), "it left the ground")
+        yield OutcomeCheck("took_off", _took_off(flight, span), "it left the ground")
     if any(way_of("px4", mode) == "mission" for mode in flight.modes_during(span)):
-        yield Check(
+        yield OutcomeCheck(
             "mission_success", mission_outcome(flight, span), "the mission was flown to its end", "the mission failed"
         )
     silent: Value = _lost_events(flight, span) or 1.0
     no_crash = _no_crash(flight, span)
     yield replace(no_crash, value=silent) if no_crash.value == 1.0 else no_crash
     acted = _failsafe(flight, _before_kill(flight, span))
-    yield Check("no_failsafe", 0.0 if acted else silent, "no failsafe acted", acted)
+    yield OutcomeCheck("no_failsafe", 0.0 if acted else silent, "no failsafe acted", acted)
     if flies:
         landed = _on_ground(flight, span, ended=ended)
-        yield Check("landed", landed, "it was on the ground at the end", "it was disarmed in the air")
-    yield Check("disarmed", 1.0 if ended else CUT, "it was disarmed at the end")
+        yield OutcomeCheck("landed", landed, "it was on the ground at the end", "it was disarmed in the air")
+    yield OutcomeCheck("disarmed", 1.0 if ended else CUT, "it was disarmed at the end")
 
 
 def _before_kill(flight: Px4Flight, span: Span) -> Span:
@@ -142,7 +142,7 @@ def _lost_events(flight: Px4Flight, span: Span) -> Unavailable | None:
     return doubt(Samples("the flight", np.concatenate(streams), [span], SUM)) if streams else None
 
 
-def _no_crash(flight: Px4Flight, span: Span) -> Check:
+def _no_crash(flight: Px4Flight, span: Span) -> OutcomeCheck:
     """Whether it stayed in control. What falls after its motors were cut is no failure of its own."""
     before = _before_kill(flight, span)
     detected_s, ended_s = flight.detected_s(before), flight.terminated_s(before)
@@ -159,7 +159,7 @@ def _no_crash(flight: Px4Flight, span: Span) -> Check:
         else ""
     )  # fmt: skip
     silent: Value = _UNTOLD if ended_s is not None and aloft_m is None else float(not how)
-    return Check("no_crash", silent if not how else 0.0, "control was kept", how)
+    return OutcomeCheck("no_crash", silent if not how else 0.0, "control was kept", how)
 
 
 def _is_in(span: Span, t: float) -> bool:

@@ -11,7 +11,6 @@ import numpy as np
 from care_core.ecosystems.findings import Event
 from care_core.ecosystems.px4.checks import estimator, flags
 from care_core.ecosystems.px4.flight import (
-    AIRBORNE_M,
     BARELY_M,
     LANDED,
     MESSAGES,
@@ -29,6 +28,7 @@ from care_core.ecosystems.px4.flight import (
 from care_core.ecosystems.px4.flown_mission import uploads
 from care_core.ecosystems.timeline import counted, damage_of, gaps, parameter_changes, repeats, timeline_of
 from care_core.ecosystems.vehicles import mode_name, vehicle_of
+from care_core.ecosystems.vehicles.way import AIRBORNE_M
 from care_core.logs.base import Table, Wanted
 
 READS: Wanted = {

@@ -41,7 +41,7 @@ _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 
 
 def examine(drive: Drive) -> Health:
-    """What happened in a ROS 1 bag or a ROS 2 drive."""
+    """What happened in the recording of a drive."""
     others = [(other, _found(other)) for other in drive.others]
     found = (*_with_fall(_found(drive), drive.fall), *other_robots(drive, others))
     findings = rank_findings(found, None if drive.fall is None else drive.fall.start_s)

@@ -25,18 +25,14 @@ from care_core.ecosystems.vehicles.vehicle import (
     vehicle_of,
     vehicle_of_run,
 )
-from care_core.metadata.aliases import ParameterAlias, alias_in, aliases_of, renamed
 
 __all__ = [
     "FAILSAFE",
     "UNLIKE_ROVERS",
     "Kind",
     "Motor",
-    "ParameterAlias",
     "Vehicle",
     "Way",
-    "alias_in",
-    "aliases_of",
     "error_kind",
     "error_words",
     "event_words",
@@ -52,7 +48,6 @@ __all__ = [
     "motors_at",
     "motors_of",
     "reason_words",
-    "renamed",
     "switched_off",
     "unrecorded_changes",
     "vehicle_of",

@@ -51,7 +51,7 @@ _TURNS = LIMITS.add("records that lie elsewhere between two of one place", 2, ""
 _CLOCK = LIMITS.add("pace of the receiver's clock, either way", 2.0, "", "a choice: simulators run at their own pace")
 _DAY_MS = 86_400_000.0
 _FIX = 3
-_ERR_GPS, _ERR_GPS_LOST, _GLITCH = 11, 7, 2
+_ERR_GPS, _GLITCH = 11, 2
 _JUMP = calibrated(
     LIMITS, ((1.0, 0.7), (1.5, 0.95), (3.0, 0.98)), "every training flight with a jump over 5 m has a glitch", "a jump"
 )

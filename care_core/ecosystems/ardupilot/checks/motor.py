@@ -86,7 +86,9 @@ _FAR_LASTS_S = LIMITS.add("shortest critical excess", 2.0, "s", "a choice: a Qua
 _CHANGED = LIMITS.add("share of an excess that it had before", 1 / 3, "", "a choice: then it was even")
 _TURNS = LIMITS.add("share of the others' speed at which it stopped", 0.3, "", "a choice: idling is more")
 _TURNING_RPM = LIMITS.add("speed of motors that turn", 1000.0, "1/min", "a choice: idling is more")
-_ASKED = LIMITS.add("share of what the others are asked for at which it is to turn", 0.5, "", "a choice")
+_TO_TURN = LIMITS.add(
+    "share of what the others are asked for at which it is to turn", 0.5, "", "a choice: what idles may stand still"
+)
 _CALIBRATION = calibrated(
     LIMITS,
     ((1.0, 0.7), (2.0, 0.85)),
@@ -444,7 +446,7 @@ def _stopped(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     usual = median(rpm, axis=0)
     turning = (usual > _TURNING_RPM) & flight.watch(t)
     asked = np.stack([np.interp(t, outputs.t, share) for share in outputs.share(slice(None))])
-    enough = _ASKED * median(asked, axis=0)
+    enough = _TO_TURN * median(asked, axis=0)
     for n, (row, share) in enumerate(zip(rpm, asked, strict=False)):
         is_asked = share > enough
         if spans := lasting(t, (row < _TURNS * usual) & turning & is_asked, 0.5):

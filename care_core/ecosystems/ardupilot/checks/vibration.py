@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M
+from care_core.ecosystems.ardupilot.airborne import OFF_GROUND_M
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import (
     calibrated,
@@ -126,7 +126,7 @@ def _scrapes(flight: Flight, t: Floats) -> Bools:
     """When a copter leans so far, so low, that an arm of it is on the ground: that shakes it, and is no vibration."""
     if not flight.is_copter or flight.tilt is None or flight.height is None:
         return np.zeros(len(t), dtype=bool)
-    return np.asarray((np.interp(t, *flight.tilt) > _LIES_DEG) & (np.interp(t, *flight.height) < AIRBORNE_M))
+    return np.asarray((np.interp(t, *flight.tilt) > _LIES_DEG) & (np.interp(t, *flight.height) < OFF_GROUND_M))
 
 
 def _against(peak: float) -> str:

@@ -30,7 +30,7 @@ from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric, points
 from care_core.ecosystems.vehicles import error_kind, error_words
 from care_core.logs.base import Table, Wanted, merge_needs
-from care_core.run import Check, Evidence, Unavailable
+from care_core.run import Evidence, OutcomeCheck, Unavailable
 
 
 class ArduPilotFlight(MissionKind):
@@ -94,14 +94,14 @@ class ArduPilotFlight(MissionKind):
         # Power is pulled of a vehicle that would not arm, which cuts the log's last record: the refusal stands.
         return is_over(mission) or (failed(mission) if is_armed(mission) else was_asked(mission))
 
-    def checks(self, mission: Mission) -> tuple[Check, ...]:
+    def checks(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         return () if not is_armed(mission) or flew_automatically(mission) else tuple(plain_checks(mission))
 
-    def outcome(self, mission: Mission) -> tuple[Check, ...]:
+    def outcome(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         if is_armed(mission):
             return tuple(plain_checks(mission, and_mission=True))
         never = 0.0 if was_asked(mission) else never_asked(mission)
-        return (Check("armed", never, "the vehicle armed", "arming was refused"),)
+        return (OutcomeCheck("armed", never, "the vehicle armed", "arming was refused"),)
 
     def span(self, mission: Mission, phase: str) -> tuple[float, float] | None:
         span = span_of_phase(mission, {"phase": phase})

@@ -29,7 +29,7 @@ from care_core.ecosystems.vehicles.arming import CUT, NEVER_ARMED
 from care_core.ecosystems.vehicles.way import AIRBORNE_M
 from care_core.logs.base import Wanted
 from care_core.numbers import Floats
-from care_core.run import Check, Unavailable, Value, is_known
+from care_core.run import OutcomeCheck, Unavailable, Value, is_known
 
 _TOOK_OFF, _LANDED = (16, 28), (18,)
 """EV records of the land detector."""
@@ -76,36 +76,38 @@ def _nothing_to_judge(mission: Mission, flown: FlownMission) -> Unavailable | No
     return None
 
 
-def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Check]:
+def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[OutcomeCheck]:
     """What a flight or drive is judged by that no limit belongs to; with its mission, where one was begun."""
     crash = crash_of(mission)
     crashed = bool(crash)
-    yield Check("armed", 1.0, "the vehicle armed")
+    yield OutcomeCheck("armed", 1.0, "the vehicle armed")
     kind = flight_of(mission).mode_kind
     if flies(kind):
-        yield Check("took_off", _took_off(mission, crashed=crashed), "it left the ground", "it never left the ground")
+        yield OutcomeCheck(
+            "took_off", _took_off(mission, crashed=crashed), "it left the ground", "it never left the ground"
+        )
     elif and_mission and kind in _DRIVES:
-        yield Check("moved", _moved(mission), "it moved")
+        yield OutcomeCheck("moved", _moved(mission), "it moved")
     done: Value = 0.0
     if and_mission and any(mode.way == "mission" for mode in modes_in_force(mission)):
         done = _mission_done(mission)
-        yield Check("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
+        yield OutcomeCheck("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
     silent: Value = lost_events(mission) or 1.0
     landed: Value = 1.0  # what does not fly comes to no harm by it
     no_crash = 0.0 if crashed else silent
     how = event_clause(mission, "crash") or crash
-    yield Check("no_crash", no_crash, "the autopilot reported no crash, and none shows", how)
+    yield OutcomeCheck("no_crash", no_crash, "the autopilot reported no crash, and none shows", how)
     failsafe = event_clause(mission, "failsafe")
-    yield Check("no_failsafe", 0.0 if failsafe else silent, "no failsafe acted", failsafe)
+    yield OutcomeCheck("no_failsafe", 0.0 if failsafe else silent, "no failsafe acted", failsafe)
     if flies(kind):
         landed = Unavailable("it crashed") if crashed else _landed(mission)
-        yield Check("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
+        yield OutcomeCheck("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
     elif done == 1.0 and not mission.ended:
         return  # what stands on the ground when all is done comes to no harm by staying armed
     at_end: Value = float(landed == 1.0 or not forced(mission)) if mission.ended else CUT
     if mission.ended and not flight_of(mission).arm_changes:
         at_end = UNRECORDED
-    yield Check("disarmed", at_end, "it was disarmed, and not by force in flight", "it was disarmed by force")
+    yield OutcomeCheck("disarmed", at_end, "it was disarmed, and not by force in flight", "it was disarmed by force")
 
 
 def _mission_done(mission: Mission) -> Value:

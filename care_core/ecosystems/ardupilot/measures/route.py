@@ -60,7 +60,7 @@ def mission_time(mission: Mission, args: Args) -> Value:
 
 @extractor("phase_time", needs=NEEDS, unit="s", args=PHASE_ARGS, rests_on=rests.heights_of_phase)
 def phase_time(mission: Mission, args: Args) -> Value:
-    """Duration of one completed part of the flown."""
+    """Duration of one completed part of the flight."""
     span = span_of_phase(mission, args)
     return span if isinstance(span, Unavailable) else span[1] - span[0]
 

@@ -33,7 +33,7 @@ from care_core.ecosystems.ros.measures.window import (
 from care_core.ecosystems.ros.motion import STANDS_MPS
 from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS, Level, LogMessage, kept_its_rate
 from care_core.logs.base import Table, Wanted
-from care_core.run import Check, Evidence, Unavailable, Value
+from care_core.run import Evidence, OutcomeCheck, Unavailable, Value
 from care_core.text import log_time
 
 _IDLE_S = 120.0
@@ -118,7 +118,7 @@ class GoalMissions(MissionKind):
         failed = [f"{one.text.partition(':')[0]} at {log_time(one.time_s)}" for one in _failed_goals(mission)]
         return (f"{len(drive.reached)} of {wanted} goals were reached", *failed)
 
-    def outcome(self, mission: Mission) -> tuple[Check, ...]:
+    def outcome(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         """Whether the goals were reached; one that its sender cancelled or replaced is no failure of the robot."""
         drive = mission.shared(window)
         goals = drive.goals
@@ -132,7 +132,7 @@ class GoalMissions(MissionKind):
             value = drive.untold
         elif goals and goals[-1].status is None:
             value = Unavailable("the log ends before the last goal was answered", "record until it is")
-        check = Check("goals_reached", value, "every goal that was not taken back was reached", word)
+        check = OutcomeCheck("goals_reached", value, "every goal that was not taken back was reached", word)
         return (goal_server(mission.spec).judged(goals, check),)
 
 

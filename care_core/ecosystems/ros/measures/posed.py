@@ -11,7 +11,7 @@ from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer
 from care_core.ecosystems.ros.posed_goals import ARRIVED_M, KIND, needs, posed_goals
 from care_core.ecosystems.ros.recoveries import Recoveries
 from care_core.records import replace
-from care_core.run import Check, Unavailable
+from care_core.run import OutcomeCheck, Unavailable
 
 _HINT = "ros2 bag record --include-hidden-topics --all, or rosbag record --all"
 
@@ -21,7 +21,7 @@ def recoveries(mission: Mission) -> Recoveries | Unavailable:
     return Unavailable("no action topic is recorded", _HINT)
 
 
-def judged(sent: Sequence[Goal], check: Check) -> Check:
+def judged(sent: Sequence[Goal], check: OutcomeCheck) -> OutcomeCheck:
     """By where the robot is, and that it says so."""
     words = f"judged by where it stood, {ARRIVED_M} m around a goal: no action topic is recorded"
     if sent and sent[-1].status is None:

@@ -23,7 +23,7 @@ from care_core.ecosystems.spans import Span, stretches
 from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats
 from care_core.records import Record, replace
-from care_core.run import Check, Unavailable
+from care_core.run import OutcomeCheck, Unavailable
 from care_core.text import log_time
 
 GOAL_TIMEOUT_S = 60.0
@@ -107,7 +107,7 @@ class GoalServer(Record):
     recoveries: Callable[[Mission], Recoveries | Unavailable]
     poses: Callable[[Mission], Poses | None] = lambda _: None
     """Where the server said that the robot was, in the frame of the goals."""
-    judged: Callable[[Sequence[Goal], Check], Check] = lambda _, check: check
+    judged: Callable[[Sequence[Goal], OutcomeCheck], OutcomeCheck] = lambda _, check: check
     """Whether its goals were reached, in the words of how that is known."""
 
 

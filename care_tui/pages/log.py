@@ -21,7 +21,7 @@ from care_tui.render.rows import Row, Rows, folded
 from care_tui.widgets.choices import Listing
 
 
-class AccountPage(DiagnosisPage):
+class LogPage(DiagnosisPage):
     NAME = "log"
     FITS = True
     HELP = (

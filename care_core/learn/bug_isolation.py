@@ -1,6 +1,6 @@
-"""What the causal engine is measured against: three rankings of a run's options that use no graph.
+"""Cooperative bug isolation (Liblit et al. 2005): options of a run ranked by statistics of predicates, with no graph.
 
-None of them can say why. Each takes the same training table and the same run.
+Names a cause as a knowledge source that owes nothing to the causal model, and cannot say why.
 """
 
 from __future__ import annotations
@@ -9,9 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from sklearn.ensemble import ExtraTreesClassifier, GradientBoostingClassifier
 
-from care_core.causal.mechanisms import columns
 from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 from care_core.records import Record
@@ -20,13 +18,6 @@ from care_core.variables import Variable
 Config = Mapping[str, float]
 BINS = 4
 Z95 = 1.959964
-TREES = 400
-
-
-def largest_deviation(config: Config, reference: Config, schema: Schema, suspects: Sequence[str]) -> list[str]:
-    """Options by how far they are from the reference, as a share of their acceptable range."""
-    distance = {name: schema.variables[name].distance(config[name], reference[name]) for name in suspects}
-    return sorted(suspects, key=lambda name: (-distance[name], name))
 
 
 class Predicate(Record):
@@ -76,25 +67,3 @@ def _importance(predicate: Predicate, values: Floats, failed: Bools) -> float:
         return 0.0
     reach = np.log(seen_failed) / np.log(max(int(failed.sum()), 2))
     return 0.0 if reach <= 0 else float(2 / (1 / increase + 1 / reach))
-
-
-class PlainClassifier:
-    """Extremely randomised trees averaged with gradient boosting, on options alone: probability of meeting
-    everything."""
-
-    def __init__(self, frame: pd.DataFrame, met_all: Bools, options: Sequence[str], seed: int = 0) -> None:
-        self.options = list(options)
-        x = frame[self.options].to_numpy(dtype=float)
-        self._trees = ExtraTreesClassifier(TREES, min_samples_leaf=2, random_state=seed).fit(x, met_all)
-        self._boosting = GradientBoostingClassifier(random_state=seed).fit(x, met_all)
-
-    def probability(self, configs: Sequence[Config]) -> Floats:
-        """Predicted probability that every objective keeps its threshold, shape (m,)."""
-        x = columns([dict(c) for c in configs], self.options)
-        mean: Floats = (self._trees.predict_proba(x)[:, 1] + self._boosting.predict_proba(x)[:, 1]) / 2
-        return mean
-
-    def rank(self, config: Config, reference: Config, suspects: Sequence[str]) -> list[str]:
-        """Options by the probability of meeting everything when each alone goes back to its reference."""
-        reached = self.probability([{**config, name: reference[name]} for name in suspects])
-        return [suspects[i] for i in np.argsort(-reached, kind="stable")]
