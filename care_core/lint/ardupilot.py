@@ -153,7 +153,7 @@ def _value(file: LintedFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Pr
     fact = facts[-1]
     bounded = [one for one in facts if one.low is not None and one.high is not None]
     if len(bounded) == len(facts):
-        if not any(_within(value, one) for one in bounded):
+        if not any(one.allows(value) for one in bounded):
             yield from _outside(file, entry, value, bounded)
     elif all(_is_enumeration(one) for one in facts):
         ever = {code for one in ardupilot.facts_of(entry.name) for code, _ in one.values}
@@ -173,13 +173,6 @@ def _is_enumeration(fact: Fact) -> bool:
 
 def _parts(release: Release) -> tuple[int, ...]:
     return tuple(map(int, release.version.split(".")))
-
-
-def _within(value: float, fact: Fact) -> bool:
-    assert fact.low is not None
-    assert fact.high is not None
-    near = 1e-6 * max(abs(fact.low), abs(fact.high))
-    return fact.low - near <= value <= fact.high + near or any(value == code for code, _ in fact.values)
 
 
 def _outside(file: LintedFile, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Problem]:

@@ -123,16 +123,11 @@ def _value(file: LintedFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Pr
     elif all(one.values for one in facts):
         if not any(value == code for one in facts for code, _ in one.values):
             yield not_listed(file, entry, value, fact)
-    elif not any(_within(value, one) for one in facts):
+    elif not any(one.allows(value) for one in facts):
         severity = Severity.WARNING if all(_is_far(value, one) for one in facts) else Severity.NOTE
         text = f"{entry.name} is {value:g}{unit}, outside {_range(fact)}."
         hint = "The firmware takes it all the same."
         yield file.problem("out-of-range", severity, entry, text, hint, fact.source)
-
-
-def _within(value: float, fact: Fact) -> bool:
-    near = 1e-6 * max(abs(fact.low or 0.0), abs(fact.high or 0.0))
-    return (fact.low is None or value >= fact.low - near) and (fact.high is None or value <= fact.high + near)
 
 
 def _is_far(value: float, fact: Fact) -> bool:

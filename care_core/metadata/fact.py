@@ -10,6 +10,10 @@ from care_core.records import Record
 FactType = Literal["float", "int", "bool", "enum", "str", "list", ""]
 
 
+_ROUNDING = 1e-6
+"""Of a bound: logs hold single precision."""
+
+
 class Fact(Record):
     """What a table says of a parameter; None or empty where its source says nothing.
 
@@ -42,6 +46,15 @@ class Fact(Record):
             return float({"true": "1", "false": "0"}.get(self.default, self.default))
         except ValueError:
             return None
+
+    def allows(self, value: float) -> bool:
+        """Whether a value is in the documented range, rounding aside, or a listed one; true where neither is known."""
+        if any(value == code for code, _ in self.values):
+            return True
+        if self.low is None and self.high is None:
+            return not self.values
+        near = _ROUNDING * max(abs(self.low or 0.0), abs(self.high or 0.0))
+        return (self.low is None or value >= self.low - near) and (self.high is None or value <= self.high + near)
 
 
 def number(text: str) -> float | None:

@@ -100,8 +100,4 @@ def _default(setting: Setting, vehicle: Vehicle) -> float | None:
 def _documented(name: str, value: float, vehicle: Vehicle) -> tuple[bool, bool]:
     """Whether a value lies outside what is documented, and whether it is a code."""
     fact = fact_of(name, vehicle.kind, vehicle.version)
-    if fact is None:
-        return False, False
-    if fact.low is not None and fact.high is not None:
-        return not fact.low <= value <= fact.high, is_code(fact)
-    return bool(fact.values) and value not in {code for code, _ in fact.values}, is_code(fact)
+    return (False, False) if fact is None else (not fact.allows(value), is_code(fact))
