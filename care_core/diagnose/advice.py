@@ -35,6 +35,7 @@ from care_core.diagnose.parts import mend_first, set_wrong, unmended, was_refuse
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Fault, Fix, Hypothesis
+from care_core.diagnose.remedies import CHARGE
 from care_core.diagnose.tell_more import AllBack
 from care_core.diagnose.worth import (
     LOOK_FIRST,
@@ -309,7 +310,7 @@ def _abstains(
     if has_cause and fixes and is_worth(fixes[0], as_driven):
         return None
     if any(cause.option.name in held for fault in faults for cause in fault.causes if not cause.is_lead):
-        return f"charge or replace the battery first: {', '.join(sorted(held))} is not lowered while it is not full"
+        return f"{CHARGE} first: {', '.join(sorted(held))} is not lowered while it is not full"
     now = float(failed.query.probability([failed.query.config])[0])
     unsafe = needs_unsafe(failed.query, max(MIN_PROBABILITY, now + WORTH.value))
     if unsafe is not None:

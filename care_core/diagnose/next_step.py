@@ -7,7 +7,15 @@ from collections.abc import Iterable, Sequence
 
 from care_core.diagnose.parts import OUTLASTED, is_pack, mend_first
 from care_core.diagnose.records import Diagnosis, Fix, Hypothesis, first_named, helps
-from care_core.diagnose.remedies import remedy
+from care_core.diagnose.remedies import (
+    ASK_WHO_CUT,
+    CHARGE,
+    CLEAR_REFUSAL,
+    LAND_EARLIER,
+    LOOK_AT_STEERING,
+    TUNE,
+    remedy,
+)
 from care_core.ecosystems.findings import (
     BY_STICK,
     KILLED,
@@ -139,12 +147,12 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
     if parts:
         return f"{_mended(parts, findings, run)}{then}"
     if any(one.title in (KILLED, STOPPED) for one in findings):
-        return f"ask why the motors were cut, and check what the fall broke{then}"
+        return f"{ASK_WHO_CUT}{then}"
     if any(one.title in BY_STICK for one in findings):
-        return f"look at how it was steered: its throttle stick was down{then}"
+        return f"{LOOK_AT_STEERING}{then}"
     swung = next((one.title for one in findings if one.kind == "tuning" and one.severity == "critical"), None)
     if swung is not None:
-        return f"look at the gains and filters of what swings ({swung}){then}"
+        return f"{TUNE.format(title=swung)}{then}"
     misled = [name for name in named if symptoms[name] not in UPSETS]
     return f"{_mended(misled, findings, run)}{then}" if misled else bench(run)
 
@@ -183,12 +191,12 @@ def _undone(diagnosis: Diagnosis) -> str:
     named = leading if leading is not None and leading.what == "parameter" else None
     if part is not None and (is_pack(part) or named is None or named.probability <= LIKELY):
         is_aside = part.severity != "critical" and first is not None and _leads(first) and first.name != part.title
-        return "charge or replace the battery" if is_pack(part) and not is_aside else ""
+        return CHARGE if is_pack(part) and not is_aside else ""
     if first is not None and first.name == OUTLASTED:
-        return "land earlier, or fly with a fuller, larger or newer battery"
+        return LAND_EARLIER
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
     if refused is not None and not refused.parameters:
-        return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
+        return CLEAR_REFUSAL.format(why=refused.title.removeprefix(REFUSED))
     if named is not None and _is_kept(named.name, diagnosis):
         return f"let {named.name} change as well: without it nothing is likely enough"
     said = None if named is None else next((one for one in findings if _says(one, named.name)), None)

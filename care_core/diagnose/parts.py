@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from care_core.diagnose.estimates import MISSION_LOST_INFO
+from care_core.diagnose.remedies import CHARGE
 from care_core.ecosystems.findings import (
     BY_STICK,
     CAME_DOWN,
@@ -114,7 +115,7 @@ def unmended(part: Finding, then: str = "") -> str:
         then: what is likelier than the part, and changed once it is mended.
     """
     if is_pack(part):
-        return f"{part.title}: charge or replace the battery; nothing is changed until it is full"
+        return f"{part.title}: {CHARGE}; nothing is changed until it is full"
     if part.title in BY_STICK:
         return f"{part.title} at {log_time(part.onset_s)}: no parameter is changed for how it was steered"
     if then:

@@ -1,4 +1,5 @@
-"""What to do about each finding, in a sentence: the one table of it. What a title says exactly comes before its kind.
+"""What to do about each finding, in a sentence: the one place of the texts. What a title says exactly comes before
+its kind.
 
 A row is true of every vehicle that can have its finding: where robots on wheels need another advice, theirs stands in a
 table of its own.
@@ -17,6 +18,14 @@ from care_core.ecosystems.findings import (
     Finding,
     FindingKind,
 )
+
+CHARGE = "charge or replace the battery"
+LAND_EARLIER = "land earlier, or fly with a fuller, larger or newer battery"
+CLEAR_REFUSAL = "clear what refused arming: {why}"
+ASK_WHO_CUT = "ask why the motors were cut, and check what the fall broke"
+LOOK_AT_STEERING = "look at how it was steered: its throttle stick was down"
+TUNE = "look at the gains and filters of what swings ({title})"
+"""Remedies that the next step chooses by more than the title and kind of one finding."""
 
 _LIFT = "check the propellers, motors and the battery under load, and weigh it: it should hover at about half throttle"
 _ANTENNA = "look at the GPS antenna: its view of the sky, walls that reflect, and what transmits close to it"
@@ -113,7 +122,7 @@ _BY_KIND: Mapping[FindingKind, str] = {
     "compass": "move the compass away from power leads and iron, and calibrate it again",
     "barometer": "cover the barometer with foam, and keep the propellers' air and sunlight from it",
     "imu": "check how the autopilot is mounted, calibrate again, and replace it if its sensors still disagree",
-    "battery": "charge or replace the battery",
+    "battery": CHARGE,
     "radio": "check the link's antennas and range, and what its failsafe is set to do",
     "airspeed": "check the pitot tube for blockage and its hoses for leaks, and calibrate it before take-off",
     "leak": "dry the hull, and find the leak with a vacuum test before the next dive",
