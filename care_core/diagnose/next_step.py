@@ -27,6 +27,7 @@ from care_core.ecosystems.findings import (
 )
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, is_simulated, vehicle_of, vehicle_of_run
+from care_core.ecosystems.way_back import SET_BY_HAND, way_back
 from care_core.logs.formats import MAVLINK_TLOG, format_named
 from care_core.metadata.causal_map import meaning_of
 from care_core.run import Run, shown
@@ -257,9 +258,9 @@ def _looked_at(name: str, diagnosis: Diagnosis) -> str:
     value = "" if setting is None else f" {shown(setting.value)}"
     meaning = meaning_of(name, vehicle_of_run(diagnosis.run).kind)
     if meaning is not None and meaning.role == "calibration" and _is_spoken_of(name, diagnosis):
-        return f"calibrate again: {name} is{value}"
+        return f"{way_back(name, meaning.role, None)}: {name} is{value}"
     suspect = next((one for one in diagnosis.outside if one.name == name), None)
-    is_chosen = suspect is not None and suspect.role in ("choice", "wiring")
-    back = f"; 'param set {name} {shown(suspect.back)}' puts it back" if suspect is not None and is_chosen else ""
+    is_set_by_hand = suspect is not None and suspect.role in SET_BY_HAND
+    back = f"; {way_back(name, suspect.role, suspect.back)}" if suspect is not None and is_set_by_hand else ""
     robot = "robot" if _is_robot(diagnosis.run) else "vehicle"
     return f"check whether {name}{value} is right for this {robot}{back}"
