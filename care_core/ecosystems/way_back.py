@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from care_core.metadata.causal_map import Role
+from care_core.run import shown
 
 SET_BY_HAND: frozenset[Role] = frozenset(("choice", "wiring"))
 """Roles of what is put back by a command: what protects is looked at first, and a calibration is made again."""
@@ -11,5 +12,5 @@ SET_BY_HAND: frozenset[Role] = frozenset(("choice", "wiring"))
 def way_back(name: str, role: Role | None, wanted: float | None, does: str = "puts it back") -> str:
     """The way back in words; with the command where a value is wanted."""
     if wanted is not None:
-        return f"'param set {name} {wanted:g}' {does}"
+        return f"'param set {name} {shown(wanted)}' {does}"
     return "calibrate again" if role in ("calibration", "written") else "check it first"

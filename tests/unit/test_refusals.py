@@ -9,6 +9,7 @@ import pytest
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.texts import in_full, refusal_of
 from care_core.ecosystems.findings import Finding, every_finding
+from care_core.ecosystems.way_back import way_back
 from care_core.logs.base import Table
 from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import meaning_of
@@ -130,6 +131,10 @@ def test_a_parameter_that_the_text_names_is_named_with_its_default_and_the_way_b
     )
     assert "RTL_ALT_TYPE is 1 (default 0): 'param set RTL_ALT_TYPE 0' puts it back" in finding.evidence
     assert finding.probability >= 0.9
+
+
+def test_a_command_of_the_way_back_rounds_no_bitmask() -> None:
+    assert way_back("SERVO_DSHOT_ESC", "wiring", 1048575.0) == "'param set SERVO_DSHOT_ESC 1048575' puts it back"
 
 
 @pytest.mark.parametrize(
