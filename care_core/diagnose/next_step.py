@@ -27,9 +27,9 @@ from care_core.ecosystems.findings import (
 )
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, is_simulated, vehicle_of, vehicle_of_run
-from care_core.ecosystems.way_back import SET_BY_HAND, way_back
+from care_core.ecosystems.way_back import way_back
 from care_core.logs.formats import MAVLINK_TLOG, format_named
-from care_core.metadata.causal_map import meaning_of
+from care_core.metadata.causal_map import SET_BY_HAND, meaning_of
 from care_core.run import Run, shown
 from care_core.text import listed
 

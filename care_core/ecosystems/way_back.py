@@ -5,9 +5,6 @@ from __future__ import annotations
 from care_core.metadata.causal_map import Role
 from care_core.run import shown
 
-SET_BY_HAND: frozenset[Role] = frozenset(("choice", "wiring"))
-"""Roles of what is put back by a command: what protects is looked at first, and a calibration is made again."""
-
 
 def way_back(name: str, role: Role | None, wanted: float | None, does: str = "puts it back") -> str:
     """The way back in words; with the command where a value is wanted."""

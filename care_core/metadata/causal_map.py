@@ -25,6 +25,16 @@ checks, fences, crash checks), which is never suggested looser; a calibration of
 wired (frame, functions, directions, orientations, ports, types of devices); written by the vehicle itself; or something
 that moves no vehicle (logs, lights, cameras, links, names)."""
 
+FROM_FLIGHTS: frozenset[Role] = frozenset(("choice",))
+"""Roles of what flights of other vehicles speak for, and a report may therefore set: how a vehicle is built, wired and
+calibrated, and what protects it, is set by nobody but its operator."""
+OF_THIS_VEHICLE: frozenset[Role] = frozenset(("wiring", "calibration"))
+"""Roles of what is right for one vehicle alone, and off the default on every sound one."""
+SET_BY_HAND: frozenset[Role] = frozenset(("choice", "wiring"))
+"""Roles of what is put back by a command: what protects is looked at first, and a calibration is made again."""
+NO_CAUSE: frozenset[Role] = frozenset(("written", "idle"))
+"""Roles of what loses no mission: outcomes, and what moves no vehicle."""
+
 Read = Literal[
     "always", "arming", "takeoff", "navigation", "hold", "rtl", "land", "manual", "guided", "fence", "battery",
     "radio", "gcs", "terrain", "rangefinder", "flow", "beacon", "airspeed", "never",

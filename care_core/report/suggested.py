@@ -16,7 +16,7 @@ from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import ConfigError, nearest
 from care_core.metadata.aliases import aliases_of
 from care_core.metadata.ardupilot import known_in
-from care_core.metadata.causal_map import Role, meaning_of
+from care_core.metadata.causal_map import FROM_FLIGHTS, OF_THIS_VEHICLE, Role, meaning_of
 from care_core.metadata.navigation import mended
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, installed_profile
@@ -29,11 +29,6 @@ from care_core.variables import Variable, is_parameter_name
 _KINDS: tuple[Kind, ...] = ("copter", "quadplane", "rover")
 """Whose parameters have names of their own."""
 _KINDS_BY_WORD: dict[str, Kind] = {kind: kind for kind in _KINDS}
-BY_REPORTS: frozenset[Role] = frozenset(("choice",))
-"""Roles of parameters outside the profile that a report may set: how a vehicle is built, wired and calibrated, and what
-protects it, is set by nobody but its operator."""
-BY_HAND: frozenset[Role] = frozenset(("wiring", "calibration"))
-"""Those that a report tells and its operator sets."""
 _MAKE_ANEW = "Do not act on this report: make one from the log with 'care triage LOG'."
 
 
@@ -68,7 +63,7 @@ def fix_sets(fix: FixEntry) -> Iterator[tuple[str, FixSet]]:
 
 
 def suggested_changes(
-    one: FixSet, schema: Schema, path: Path, key: str, roles: frozenset[Role] = BY_REPORTS
+    one: FixSet, schema: Schema, path: Path, key: str, roles: frozenset[Role] = FROM_FLIGHTS
 ) -> tuple[SuggestedChange, ...]:
     """The changes of a fix, or of an alternative, as the profile knows them.
 
@@ -109,7 +104,7 @@ def check_acceptable(change: SuggestedChange, path: Path) -> None:
 def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str, roles: frozenset[Role]) -> SuggestedChange:
     options = {option.name: option for option in schema.options}
     option = options.get(change.option) or _outside(change.option, schema, roles)
-    if option is None and _outside(change.option, schema, BY_HAND) is not None:
+    if option is None and _outside(change.option, schema, OF_THIS_VEHICLE) is not None:
         said = f"{clean(change.option)} belongs to how this vehicle is wired or calibrated, which no report sets"
         raise ConfigError(f"{said}.", hint="Set it by hand, where it is right.", where=f"{path}: {key}.option")
     if option is None:
@@ -132,7 +127,7 @@ def _outside(name: str, schema: Schema, roles: frozenset[Role]) -> Variable | No
     """A parameter that no option of the profile sets, where the firmware documents it and it has one of these roles, or
     where a recording of a ROS robot shows its value."""
     vehicle = Vehicle(_KINDS_BY_WORD.get(schema.match.get("vehicle", ""), "unknown"), "", "", None)
-    if schema.match.get("stack") and mended(name) and is_parameter_name(name) and roles >= BY_REPORTS:
+    if schema.match.get("stack") and mended(name) and is_parameter_name(name) and roles >= FROM_FLIGHTS:
         return outside_option(name, None, vehicle)
     meaning = meaning_of(name, vehicle.kind) if is_parameter_name(name) else None
     if meaning is None or meaning.role not in roles or not known_in(name):

@@ -21,6 +21,7 @@ from care_core.diagnose.verify import (
     VerifyVerdict,
 )
 from care_core.errors import ExitCode, UsageError
+from care_core.metadata.causal_map import FROM_FLIGHTS, OF_THIS_VEHICLE
 from care_core.profile.schema import Schema
 from care_core.records import field
 from care_core.report.document import (
@@ -34,7 +35,7 @@ from care_core.report.document import (
 )
 from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import profile_of
-from care_core.report.suggested import BY_HAND, BY_REPORTS, fix_sets, suggested_changes
+from care_core.report.suggested import fix_sets, suggested_changes
 from care_core.run import Run
 from care_core.text import WIDTH, clean, percent, wrapped
 from care_core.variables import Threshold
@@ -149,7 +150,7 @@ def promise_of(report: TriageDocument, schema: Schema, path: Path) -> ReportedPr
             PromisedSet(
                 {
                     one.option.name: (one.before, one.value)
-                    for one in suggested_changes(fix, schema, path, key, BY_REPORTS | BY_HAND)
+                    for one in suggested_changes(fix, schema, path, key, FROM_FLIGHTS | OF_THIS_VEHICLE)
                 },
                 fix.odds,
                 {name: (predicted.low, predicted.high) for name, predicted in fix.predicted.items()},

@@ -28,11 +28,12 @@ from care_core.diagnose.verdict import verdict_of
 from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding, Health
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import CareError, ConfigError
+from care_core.metadata.causal_map import FROM_FLIGHTS, OF_THIS_VEHICLE
 from care_core.metadata.screening import flights_of, plain_refusal
 from care_core.profile.store import load_profile
 from care_core.records import replace
 from care_core.report.document import ChangeEntry, FixSet
-from care_core.report.suggested import BY_HAND, BY_REPORTS, suggested_changes
+from care_core.report.suggested import suggested_changes
 from care_core.run import Setting
 from tests.made import TIME, made_run
 
@@ -280,14 +281,16 @@ def test_a_report_sets_what_an_operator_chooses_and_no_wiring_or_protection() ->
         with pytest.raises(ConfigError, match="wired or calibrated, which no report sets"):
             suggested_changes(entry(name, 1.0), schema, Path("r"), "fix")
     for name in ("BATT_LOW_MAH", "ARMING_CHECK", "NO_SUCH", "a b"):
-        for roles in (BY_REPORTS, BY_REPORTS | BY_HAND):
+        for roles in (FROM_FLIGHTS, FROM_FLIGHTS | OF_THIS_VEHICLE):
             with pytest.raises(ConfigError, match="cannot be acted on"):
                 suggested_changes(entry(name, 1.0), schema, Path("r"), "fix", roles)
 
 
 def test_a_calibration_that_was_advised_can_be_verified_and_not_applied() -> None:
     schema = load_profile("ardurover").schema
-    (change,) = suggested_changes(entry("SERVO1_TRIM", 1500.0), schema, Path("r"), "fix", BY_REPORTS | BY_HAND)
+    (change,) = suggested_changes(
+        entry("SERVO1_TRIM", 1500.0), schema, Path("r"), "fix", FROM_FLIGHTS | OF_THIS_VEHICLE
+    )
     assert (change.option.name, change.value) == ("SERVO1_TRIM", 1500.0)
 
 

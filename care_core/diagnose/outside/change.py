@@ -9,8 +9,7 @@ from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect, first_na
 from care_core.ecosystems.findings import Finding, every_finding
 from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.ecosystems.vehicles.vehicle import Kind, Vehicle
-from care_core.metadata.causal_map import Role as ParameterRole
-from care_core.metadata.causal_map import meaning_of
+from care_core.metadata.causal_map import FROM_FLIGHTS, meaning_of
 from care_core.metadata.fact import Fact
 from care_core.metadata.firmware import fact_of, is_code
 from care_core.metadata.navigation import mended
@@ -18,8 +17,6 @@ from care_core.records import Record, replace
 from care_core.run import Run, shown
 from care_core.variables import Change, Role, ValueType, Variable
 
-LEARNED: frozenset[ParameterRole] = frozenset(("choice",))
-"""Roles of parameters that flights speak for: wiring and calibration are of one vehicle alone."""
 BUILT_AS = "frame"
 """The part whose parameters say how the vehicle is built, which its operator alone knows, whatever the default is."""
 ENOUGH = 0.4
@@ -65,7 +62,7 @@ def leading_outside(
     wanted = suspect.back if measured is None and suspect is not None else measured
     if finding is None and suspect is None:
         return None
-    is_learned = suspect is not None and suspect.is_learned and meaning is not None and meaning.role in LEARNED
+    is_learned = suspect is not None and suspect.is_learned and meaning is not None and meaning.role in FROM_FLIGHTS
     is_carried = (measured is not None or is_learned) and not _is_kept(first.name, vehicle_of_run(run).kind)
     return Advisable(
         first.name,

@@ -9,7 +9,7 @@ from care_core.configs.driven import same_value
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.metadata import ardupilot
-from care_core.metadata.causal_map import Meaning, meaning_of
+from care_core.metadata.causal_map import NO_CAUSE, Meaning, meaning_of
 from care_core.metadata.firmware import fact_of, is_code
 from care_core.records import Record
 from care_core.run import Setting
@@ -19,8 +19,6 @@ TABLED = (4, 3), (4, 6)
 _AT_EVERY_START = re.compile(r"INS\d?_GYR\d?_?OFF.*|COMPASS_PRIO\d_ID|.*_DEV_?ID\d?|BARO\d_GND_PRESS|STAT_.*")
 UNFELT = 1e-5
 """What differs from 0 by less only marks a calibration as done (SENS_BOARD_X_OFF of PX4's simulated airframes)."""
-UNCHOSEN = frozenset(("written", "idle"))
-"""Roles of parameters that lose no mission: outcomes, and what moves no vehicle."""
 
 
 class OffParameter(Record):
@@ -67,7 +65,7 @@ def off_parameters(
         if back is None or (_is_default(default, setting.value) and not is_changed):
             continue
         meaning = meaning_of(name, vehicle.kind)
-        if meaning is None or meaning.role in UNCHOSEN:
+        if meaning is None or meaning.role in NO_CAUSE:
             continue
         yield OffParameter(
             name,

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from care_core.diagnose.outside.off import OffParameter
 from care_core.diagnose.outside.signs import Signs
 from care_core.diagnose.records import OutsideSuspect
-from care_core.metadata.causal_map import Meaning, Read, Role, Sign
+from care_core.metadata.causal_map import OF_THIS_VEHICLE, Meaning, Read, Role, Sign
 from care_core.metadata.screening import ScreeningFlight, flights_of
 from care_core.run import Run, shown
 from care_core.text import listed
@@ -34,8 +34,6 @@ MANY = 20.0
 """From this ratio of its documented bounds on a parameter's distance is that of logarithms."""
 UNLIKELY = 0.02
 """Flights that count for every other way to fail: those that were flown do not show all."""
-BUILT: frozenset[Role] = frozenset(("wiring", "calibration"))
-"""Roles of parameters that are off on every sound vehicle: one among many others is off for a good reason."""
 LEAST = 0.02
 """What is less likely is no suspect."""
 NEARLY, LEAST_OF_IT = 0.02, 0.002
@@ -144,7 +142,7 @@ def _wrong(one: OffParameter, flights: Sequence[ScreeningFlight], blocks: Mappin
     share = _lost(one, flights) if flights else UNSCREENED.get(one.meaning.role, 0.0)
     if one.is_out_of_range:
         share = max(share, OUT_OF_RANGE)
-    if one.meaning.role in BUILT and one.is_changed is not True:
+    if one.meaning.role in OF_THIS_VEHICLE and one.is_changed is not True:  # one among many is off for a good reason
         share /= blocks[one.meaning.role]
     if one.is_changed is None:
         return share

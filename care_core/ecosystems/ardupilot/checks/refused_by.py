@@ -12,9 +12,9 @@ from care_core.ecosystems.ardupilot.checks.settings.supply import wrong_scale
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.texts import Refusal
 from care_core.ecosystems.base import Limits
-from care_core.ecosystems.way_back import SET_BY_HAND, way_back
+from care_core.ecosystems.way_back import way_back
 from care_core.metadata.ardupilot import firmware_default
-from care_core.metadata.causal_map import Role, meaning_of
+from care_core.metadata.causal_map import SET_BY_HAND, Role, meaning_of
 from care_core.metadata.refusals import Must, refusal_reads
 from care_core.run import Setting
 

@@ -9,9 +9,9 @@ from care_core.ecosystems.findings import NOT_READY, Finding
 from care_core.ecosystems.px4.flight import MESSAGES, STATUS, Px4Flight, is_bare_denial, reason_of
 from care_core.ecosystems.px4.preflight import read_by
 from care_core.ecosystems.timeline import counted
-from care_core.ecosystems.way_back import SET_BY_HAND, way_back
+from care_core.ecosystems.way_back import way_back
 from care_core.logs.base import Wanted
-from care_core.metadata.causal_map import meaning_of
+from care_core.metadata.causal_map import SET_BY_HAND, meaning_of
 from care_core.metadata.firmware import PX4
 from care_core.run import Setting, shown
 
