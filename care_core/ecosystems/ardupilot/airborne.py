@@ -20,6 +20,7 @@ from care_core.ecosystems.ardupilot.statistics import parts
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.spans import Span, during, inside, runs, within
 from care_core.ecosystems.vehicles import flies
+from care_core.ecosystems.vehicles.errors import CRASH_CHECK
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, pieces
 
@@ -32,7 +33,6 @@ READS: Wanted = {
 
 UPSIDE_DOWN_DEG = 100.0
 """No mode that levels a plane banks it so far, ROLL_LIMIT_DEG is at most 90; nor is it a slope or a wave."""
-_ERR_CRASH = 12
 _CRASH_CHECK_S = 2.0
 """The firmware says "crash" when control was lost for this long (crash_check.cpp: CRASH_CHECK_TRIGGER_SEC)."""
 _OUT_OF_CONTROL_DEG = 30.0
@@ -420,7 +420,7 @@ class Airborne(Armed):
 
     @property
     def _impact_of_lost_s(self) -> float | None:
-        crash = min((t for t, code in self.errors(_ERR_CRASH) if code > 0), default=None)
+        crash = min((t for t, code in self.errors(CRASH_CHECK) if code > 0), default=None)
         lost = self.lost_control_s
         if crash is None and lost is None:
             return None

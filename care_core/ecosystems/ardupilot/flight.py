@@ -20,6 +20,7 @@ from care_core.ecosystems.ardupilot.one_run import OneRun, windows_of
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.liveness import Frozen
 from care_core.ecosystems.spans import Span, during, runs
+from care_core.ecosystems.vehicles.errors import BATTERY_FAILSAFE
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import Bools, Floats
 
@@ -43,7 +44,6 @@ _LIFTS = 0.2
 """Throttle that lifts a light copter, or holds it in a descent; on the ground it idles at half of it."""
 _REFUSED_S = 30.0
 """The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
-_ERR_BATTERY = 6
 
 
 def _lasting(t: Floats, held: Bools, least_s: float) -> tuple[Span, ...]:
@@ -176,7 +176,7 @@ class Flight(Airborne):
     @cached_property
     def battery_failsafe_s(self) -> float | None:
         """When the firmware's battery failsafe began, in flight."""
-        times = [t for t, code in self.errors(_ERR_BATTERY) if code > 0]
+        times = [t for t, code in self.errors(BATTERY_FAILSAFE) if code > 0]
         times += [t for t, text in self.messages if "battery" in text.casefold() and "failsafe" in text.casefold()]
         return min((t for t in times if any(start <= t <= end + 1 for start, end in self.armed)), default=None)
 

@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from care_core.ecosystems.vehicles.errors import EKF_CHECK, EKF_PRIMARY, GPS, THRUST_LOSS, VIBRATION
+
 _ROUTINE = re.compile(
     r"""
       (Ardu\w+|APM:\w+|Rover|AntennaTracker|Blimp)\sV\d | \S.*\s[Vv]\d+\.\d+\S*\s\([0-9a-f]{8}\)$   # firmware
@@ -27,11 +29,11 @@ _LONGEST_TEXT = 50
 """Characters of a STATUSTEXT; what is longer is cut, or goes on in another."""
 _REFUSAL = re.compile(r"(?P<before>Pre)?Arm: (?P<why>.*)")
 RECORDED = {
-    11: re.compile(r"GPS Glitch|Glitch cleared", re.IGNORECASE),
-    16: re.compile(r"EKF variance", re.IGNORECASE),
-    24: re.compile(r"EKF primary changed|lane switch", re.IGNORECASE),
-    25: re.compile(r"Potential Thrust Loss", re.IGNORECASE),
-    29: re.compile(r"Vibration compensation", re.IGNORECASE),
+    GPS: re.compile(r"GPS Glitch|Glitch cleared", re.IGNORECASE),
+    EKF_CHECK: re.compile(r"EKF variance", re.IGNORECASE),
+    EKF_PRIMARY: re.compile(r"EKF primary changed|lane switch", re.IGNORECASE),
+    THRUST_LOSS: re.compile(r"Potential Thrust Loss", re.IGNORECASE),
+    VIBRATION: re.compile(r"Vibration compensation", re.IGNORECASE),
 }
 """Subsystem of ERR records -> the texts that say the same."""
 

@@ -38,6 +38,7 @@ from care_core.ecosystems.vehicles import (
     motors_of,
     reason_words,
 )
+from care_core.ecosystems.vehicles.errors import EKF_PRIMARY, TERRAIN
 from care_core.logs.base import Table, Wanted
 from care_core.text import listed, log_time, times_until
 
@@ -62,7 +63,6 @@ _QUIET_EVENTS = frozenset((_ARMED, _DISARMED, 15, 16, 17, 18, 25, 26, 27, 28, 29
 _AT_START = frozenset((54, 55, 60, 62, 67, 164))
 """Events that mean nothing while disarmed: estimators and switches finding their place."""
 _INTERLOCK_OFF, _YAW_RESET = 56, 62
-_EKF_PRIMARY, _TERRAIN = 24, 21
 _SPOOL_DOWN_S = 6.0
 """A landing switches the interlock off itself before it disarms."""
 _FLURRY_S, _FLURRY = 1.0, 4
@@ -205,9 +205,9 @@ def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
     lasted: dict[tuple[int, int], list[Span]] = {}
     lanes: list[tuple[float, int]] = []
     for at, (t, subsystem, code) in enumerate(rows):
-        if subsystem == _TERRAIN and not within(flight.armed, t):
+        if subsystem == TERRAIN and not within(flight.armed, t):
             continue  # every start, until the map is loaded
-        if subsystem == _EKF_PRIMARY:
+        if subsystem == EKF_PRIMARY:
             lanes.append((t, code))
             continue
         if is_over(subsystem, code):
@@ -220,7 +220,7 @@ def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
         yield Event(times[0][0], kind, error_words(subsystem, code, vehicle.kind) + _lasting(times), "ERR")
     if lanes:
         t, code = lanes[0]
-        told = error_words(_EKF_PRIMARY, code, vehicle.kind)
+        told = error_words(EKF_PRIMARY, code, vehicle.kind)
         again = f", and {counted(len(lanes) - 1, 'more switch', 'es')} until {log_time(lanes[-1][0], 0)}"
         yield Event(t, "error", told + (again if len(lanes) > 1 else ""), "ERR")
 

@@ -9,7 +9,12 @@ from care_core.ecosystems.vehicles.modes import mode_name
 from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.records import Record, field
 
-_FLIGHT_MODE, _EKF_PRIMARY, _FENCE = 10, 24, 9
+RADIO_FAILSAFE, BATTERY_FAILSAFE, GCS_FAILSAFE, FENCE, FLIGHT_MODE = 5, 6, 8, 9, 10
+GPS, CRASH_CHECK, EKF_CHECK, EKF_FAILSAFE, CPU_FAILSAFE = 11, 12, 16, 17, 19
+TERRAIN, EKF_PRIMARY, THRUST_LOSS, LEAK, VIBRATION = 21, 24, 25, 27, 29
+"""Subsystems that checks ask for."""
+GPS_GLITCH = 2
+"""The code of a glitch, of subsystem GPS."""
 FAILSAFE = re.compile(
     r"(?<!PrecLand: )failsafe(?!s? (measures|off|over|cleared|disabled)\b|\W+(short|long) event off)"
     r"|(critical|dangerous|emergency) battery\b(?!.*\b(advised|recommended)).*\b(landing|returning|return|RTL)\b",
@@ -36,34 +41,35 @@ SUBSYSTEMS: Mapping[int, Subsystem] = {
     2: Subsystem("radio", codes={0: "radio is back", 2: "no radio frames for a while"}),
     3: Subsystem("compass", codes={0: "compass is healthy again", 1: "compass did not start", 4: "compass unhealthy"}),
     4: Subsystem("optical flow", codes={1: "optical flow did not start"}),
-    5: Subsystem("radio failsafe", "failsafe", _SWITCHED),
-    6: Subsystem("battery failsafe", "failsafe", _SWITCHED),
+    RADIO_FAILSAFE: Subsystem("radio failsafe", "failsafe", _SWITCHED),
+    BATTERY_FAILSAFE: Subsystem("battery failsafe", "failsafe", _SWITCHED),
     7: Subsystem("GPS failsafe", codes={0: "GPS is back", 1: "no GPS position"}),
-    8: Subsystem("ground station failsafe", "failsafe", _SWITCHED),
-    _FENCE: Subsystem("fence breach", "failsafe", {0: "back inside the fence"}),
-    _FLIGHT_MODE: Subsystem("flight mode"),
-    11: Subsystem("GPS", codes={0: "GPS glitch cleared", 2: "GPS glitch", 4: "GPS unhealthy"}),
-    12: Subsystem("crash check", "crash", {1: "crash detected", 2: "loss of control detected"}),
+    GCS_FAILSAFE: Subsystem("ground station failsafe", "failsafe", _SWITCHED),
+    FENCE: Subsystem("fence breach", "failsafe", {0: "back inside the fence"}),
+    FLIGHT_MODE: Subsystem("flight mode"),
+    GPS: Subsystem("GPS", codes={0: "GPS glitch cleared", GPS_GLITCH: "GPS glitch", 4: "GPS unhealthy"}),
+    CRASH_CHECK: Subsystem("crash check", "crash", {1: "crash detected", 2: "loss of control detected"}),
     13: Subsystem("flip", codes={2: "flip abandoned"}),
     15: Subsystem("parachute", codes={2: "parachute not released: too low", 3: "parachute not released: landed"}),
-    16: Subsystem("EKF check", "ekf", {0: "EKF variances are fine again", 2: "EKF variances too high"}),
-    17: Subsystem("EKF failsafe", "failsafe", _SWITCHED),
+    EKF_CHECK: Subsystem("EKF check", "ekf", {0: "EKF variances are fine again", 2: "EKF variances too high"}),
+    EKF_FAILSAFE: Subsystem("EKF failsafe", "failsafe", _SWITCHED),
     18: Subsystem("barometer", codes={0: "barometer is fine again", 2: "barometer glitch", 3: "bad depth",
                                       4: "barometer unhealthy"}),
-    19: Subsystem("CPU failsafe", codes={0: "main loop runs again", 1: "main loop stuck"}),
+    CPU_FAILSAFE: Subsystem("CPU failsafe", codes={0: "main loop runs again", 1: "main loop stuck"}),
     20: Subsystem("ADSB failsafe", "failsafe", _SWITCHED),
-    21: Subsystem("terrain", codes={2: "terrain data missing"}),
+    TERRAIN: Subsystem("terrain", codes={2: "terrain data missing"}),
     22: Subsystem("navigation", codes={
         2: "destination refused", 3: "RTL started anew", 4: "circle did not start", 5: "destination beyond the fence",
         6: "RTL without range finder",
     }),
     23: Subsystem("terrain failsafe", "failsafe", _SWITCHED),
-    _EKF_PRIMARY: Subsystem("EKF primary", "ekf"),
-    25: Subsystem("thrust loss check", "thrust", {0: "thrust loss over", 1: "potential thrust loss"}),
+    EKF_PRIMARY: Subsystem("EKF primary", "ekf"),
+    THRUST_LOSS: Subsystem("thrust loss check", "thrust", {0: "thrust loss over", 1: "potential thrust loss"}),
     26: Subsystem("sensor failsafe", "failsafe", _SWITCHED),
-    27: Subsystem("leak failsafe", "failsafe", {0: "no leak any more", 1: "leak detected"}),
+    LEAK: Subsystem("leak failsafe", "failsafe", {0: "no leak any more", 1: "leak detected"}),
     28: Subsystem("pilot input failsafe", codes=_SWITCHED),
-    29: Subsystem("vibration failsafe", "vibration", {0: "vibration compensation off", 1: "vibration compensation on"}),
+    VIBRATION: Subsystem("vibration failsafe", "vibration", {0: "vibration compensation off",
+                                                             1: "vibration compensation on"}),
     30: Subsystem("internal error"),
     31: Subsystem("dead reckoning failsafe", "failsafe", _SWITCHED),
 }  # fmt: skip
@@ -71,11 +77,11 @@ SUBSYSTEMS: Mapping[int, Subsystem] = {
 
 def error_words(subsystem: int, code: int, kind: Kind = "copter") -> str:
     """An ERR record as a clause: "battery failsafe", "radio failsafe over", "Loiter was refused"."""
-    if subsystem == _FLIGHT_MODE:
+    if subsystem == FLIGHT_MODE:
         return f"{mode_name(kind, code)} was refused"
-    if subsystem == _EKF_PRIMARY:
+    if subsystem == EKF_PRIMARY:
         return f"estimator switched to lane {code}"
-    if subsystem == _FENCE and code:
+    if subsystem == FENCE and code:
         breached = [name for bit, name in _FENCES if code & bit]
         return f"fence breach ({', '.join(breached)})" if breached else f"fence breach, code {code}"
     known = SUBSYSTEMS.get(subsystem)
@@ -97,4 +103,4 @@ def error_kind(subsystem: int) -> str:
 
 def is_over(subsystem: int, code: int) -> bool:
     """Whether the record says that the fault went away."""
-    return code == 0 and subsystem not in (_FLIGHT_MODE, _EKF_PRIMARY)
+    return code == 0 and subsystem not in (FLIGHT_MODE, EKF_PRIMARY)

@@ -16,6 +16,7 @@ from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during, within
+from care_core.ecosystems.vehicles.errors import CPU_FAILSAFE
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"PM": ("NLon", "NL", "Load")}
@@ -28,12 +29,11 @@ FULL_LOAD = LIMITS.add("load of the scheduler", 950.0, "tenths of a per cent", "
 _LASTS_S = LIMITS.add("shortest overload", 5.0, "s", "a choice: a slow loop now and then harms nothing")
 _STUCK = LIMITS.add("probability where the CPU failsafe acted", 0.8, "", "the firmware's own word")
 _OVERLOADED = LIMITS.add("probability of an overload", 0.4, "", "a choice")
-_FAILSAFE_CPU = 19
 
 
 def find(flight: Flight) -> Iterator[Finding]:
     """Overload while armed."""
-    stuck = [t for t, code in flight.errors(_FAILSAFE_CPU) if code and within(flight.armed, t)]
+    stuck = [t for t, code in flight.errors(CPU_FAILSAFE) if code and within(flight.armed, t)]
     if stuck:
         yield Finding(
             kind="cpu",
@@ -42,7 +42,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             end_s=stuck[-1],
             severity="critical",
             evidence="CPU failsafe",
-            source="ERR 19",
+            source=f"ERR {CPU_FAILSAFE}",
             probability=_STUCK,
         )
         return

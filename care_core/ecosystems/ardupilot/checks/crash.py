@@ -11,11 +11,12 @@ from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import CAME_DOWN, STEERED, UNDRIVEN, Finding
+from care_core.ecosystems.vehicles.errors import CRASH_CHECK
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"RCIN": ("C3",)}
 
-_ERR_CRASH, _FEWEST = 12, 5
+_FEWEST = 5
 LIMITS = Limits()
 _LOW_M = LIMITS.add("height of a tip-over", 1.5, "m", "a choice: lower than a person's chest")
 _TAKEOFF_S = LIMITS.add("tip-over after the first throttle", 15.0, "s", "a choice: a take-off takes no longer")
@@ -34,7 +35,7 @@ _STRANDED = LIMITS.add("probability of what could not rise", 0.0, "", "it says t
 
 def find(flight: Flight) -> Iterator[Finding]:
     """One finding: tipped over before it had flown, crashed, or came down."""
-    told = min((t for t, code in flight.errors(_ERR_CRASH) if code > 0), default=None)
+    told = min((t for t, code in flight.errors(CRASH_CHECK) if code > 0), default=None)
     said = min((t for t, text in flight.messages if text.startswith(("Crash: ", "Crash!"))), default=None)
     lost, impact = flight.lost_control_s, flight.impact_s
     begin = min((t for t in (told, said, lost, impact) if t is not None), default=None)

@@ -16,6 +16,7 @@ from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.spans import during, within
+from care_core.ecosystems.vehicles.errors import EKF_CHECK, EKF_FAILSAFE
 from care_core.logs.base import Wanted
 from care_core.text import log_time
 
@@ -27,7 +28,6 @@ _LASTS_S = LIMITS.add("shortest rejection", 2.0, "s", "a choice: single outliers
 _REJECTED = LIMITS.add("probability that the estimator is at fault", 0.2, "", "a choice: mostly its sensors are")
 _SWITCHED = LIMITS.add("probability of a changed lane", 0.3, "", "a choice: it switches to the better sensor")
 _BOOTED = LIMITS.add("probability of ARMING_REQUIRE", 0.9, "", "it is all over once there is a position")
-_EKF_CHECK, _FAILSAFE_EKF = 16, 17
 _WORDS = {"SV": "velocity", "SP": "position", "SH": "height", "SM": "magnetic field"}
 _NEEDS_NO_ARMING = "ARMING_REQUIRE"
 _LANE = re.compile(r"(lane switch|EKF primary changed|switching to (compass|IMU|GPS)|EKF Failsafe|EKF variance)", re.I)
@@ -45,8 +45,8 @@ def find(flight: Flight) -> Iterator[Finding]:
                 peak = float(np.max(core[field][(core.t >= start) & (core.t <= end)]))
                 if field not in worst or start < worst[field][0]:
                     worst[field] = (start, end, peak)
-    failed = _inside(flight, [t for t, code in flight.errors(_FAILSAFE_EKF) if code])
-    failed += _inside(flight, [t for t, code in flight.errors(_EKF_CHECK) if code])
+    failed = _inside(flight, [t for t, code in flight.errors(EKF_FAILSAFE) if code])
+    failed += _inside(flight, [t for t, code in flight.errors(EKF_CHECK) if code])
     switched = _inside(flight, [t for t, text in flight.messages if _LANE.search(text)])
     if not worst and not failed and not switched:
         return

@@ -12,6 +12,7 @@ from care_core.ecosystems.ardupilot.held_missions import PLACES, TAKEOFF, Item
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during
+from care_core.ecosystems.vehicles.errors import FENCE
 from care_core.geodesy import offset_m
 from care_core.logs.base import Wanted
 
@@ -23,7 +24,6 @@ _WAS_SENT = LIMITS.add("probability of the fence", 0.9, "", "what was asked for 
 _STOPS = LIMITS.add("probability that a mission fails of it", 0.95, "", "the rest of the mission is not flown")
 _BEFORE_S = 0.1
 _BY_ITSELF = frozenset(("mission", "guided"))
-_ERR_FENCE = 9
 _TOO_HIGH, _TOO_FAR = 1, 2
 """Kinds of breach (AC_Fence.h: AC_FENCE_TYPE_ALT_MAX, AC_FENCE_TYPE_CIRCLE)."""
 _ABOVE_HOME = frozenset((3, 6))
@@ -33,7 +33,7 @@ _SWITCHES = ("FENCE_ENABLE", "FENCE_AUTOENABLE")
 
 def find(flight: Flight) -> Iterator[Finding]:
     """The first fence that stopped what the vehicle was told to do."""
-    for t, code in flight.errors(_ERR_FENCE):
+    for t, code in flight.errors(FENCE):
         mode = flight.mode_at(t - _BEFORE_S)
         if mode is None or mode.way not in _BY_ITSELF:
             continue  # a pilot flies as he likes

@@ -18,6 +18,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.spans import during, inside, seconds_in, within
 from care_core.ecosystems.vehicles import flies
+from care_core.ecosystems.vehicles.errors import GPS, GPS_GLITCH
 from care_core.geodesy import METRES_PER_DEGREE, offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, quantile
@@ -51,7 +52,6 @@ _TURNS = LIMITS.add("records that lie elsewhere between two of one place", 2, ""
 _CLOCK = LIMITS.add("pace of the receiver's clock, either way", 2.0, "", "a choice: simulators run at their own pace")
 _DAY_MS = 86_400_000.0
 _FIX = 3
-_ERR_GPS, _GLITCH = 11, 2
 _JUMP = calibrated(
     LIMITS, ((1.0, 0.7), (1.5, 0.95), (3.0, 0.98)), "every training flight with a jump over 5 m has a glitch", "a jump"
 )
@@ -174,9 +174,9 @@ def _severity(flight: Flight, start: float, is_large: bool) -> Severity:
 
 def _reported(flight: Flight) -> Iterator[Finding]:
     """Glitches and losses as the firmware counted them."""
-    inside = [(t, code) for t, code in flight.errors(_ERR_GPS) if code == _GLITCH and within(flight.flown, t)]
+    inside = [(t, code) for t, code in flight.errors(GPS) if code == GPS_GLITCH and within(flight.flown, t)]
     if inside:
-        cleared = [t for t, code in flight.errors(_ERR_GPS) if code == 0 and t > inside[0][0]]
+        cleared = [t for t, code in flight.errors(GPS) if code == 0 and t > inside[0][0]]
         yield Finding(
             kind="gps",
             title="GPS glitch",

@@ -15,6 +15,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during
+from care_core.ecosystems.vehicles.errors import EKF_CHECK, EKF_FAILSAFE
 from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats
 
@@ -37,7 +38,6 @@ _SURE = LIMITS.add("probability of the arm", 0.9, "", "all 13 such flights have 
 _LOST = LIMITS.add("probability that a mission fails of it, after an EKF failsafe", 0.95, "", "7 of 7 such flights")
 _OFF_PATH = LIMITS.add("probability that a mission fails of a wrong antenna, else", 0.8, "", "3 of 3 such flights")
 _IN_TURNS = LIMITS.add("probability that a mission fails of a wrong IMU, else", 0.3, "", "none of 8 flights; a choice")
-_ERR_EKF = (16, 17)
 _STEP_S, _LEARNED_S = 0.1, 1.0
 _LAGS_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
 """Receivers are late by so much (AP_GPS)."""
@@ -61,7 +61,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     if not found:
         return
     _, arm, (at, off, given, alike) = max(found, key=lambda one: one[0])
-    lost = next((t for code in _ERR_EKF for t, of in flight.errors(code) if of and t >= at), None)
+    told = (*flight.errors(EKF_CHECK), *flight.errors(EKF_FAILSAFE))
+    lost = next((t for t, code in told if code and t >= at), None)
     set_to = ", ".join(f"{name} is {flight.setting(name):g} m" for name in arm.parameters)
     yield Finding(
         kind="gps",

@@ -8,14 +8,14 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.spans import within
+from care_core.ecosystems.vehicles.errors import GCS_FAILSAFE, RADIO_FAILSAFE
 from care_core.logs.base import Wanted
 from care_core.text import log_time
 
 READS: Wanted = {}
 
-_RADIO, _GROUND_STATION = 5, 8
-_LINKS = {_RADIO: "the radio link was lost", _GROUND_STATION: "the ground station link was lost"}
-_WORDS = {_RADIO: ("radio failsafe", "throttle failsafe"), _GROUND_STATION: ("gcs failsafe",)}
+_LINKS = {RADIO_FAILSAFE: "the radio link was lost", GCS_FAILSAFE: "the ground station link was lost"}
+_WORDS = {RADIO_FAILSAFE: ("radio failsafe", "throttle failsafe"), GCS_FAILSAFE: ("gcs failsafe",)}
 LIMITS = Limits()
 _BRIEF_S = LIMITS.add("loss that explains no crash", 1.0, "s", "a choice")
 _LOST = LIMITS.add("probability of a lost link", 0.8, "", "the firmware's own word")
@@ -35,7 +35,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         back = [t for t, code in told if code == 0 and t > gone[0]]
         end = back[0] if back else flight.watched[-1][1]
         away = end - gone[0]
-        severity: Severity = "warning" if away < _BRIEF_S or subsystem == _GROUND_STATION else "critical"
+        severity: Severity = "warning" if away < _BRIEF_S or subsystem == GCS_FAILSAFE else "critical"
         if not flight.armed:
             severity = "info"  # a transmitter that is switched off on the ground
         yield Finding(

@@ -17,6 +17,7 @@ from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.ecosystems.spans import Span, during, seconds_in
+from care_core.ecosystems.vehicles.errors import BATTERY_FAILSAFE
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 from care_core.text import log_time
@@ -40,7 +41,6 @@ _PROBABILITY: Mapping[SuspectKind, float] = {
     ),
     "parameter": LIMITS.add("probability of a weak part where MOT_SPIN_MAX is low", 0.1, "", "the same 83 flights"),
 }
-_FAILSAFE_BATT = 6
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -65,7 +65,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         before = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
         lasted = seconds_in(full)
         grounded = not flight.flown and lasted > _GROUNDED_S
-        lost = flight.impact_s is not None or any(code for _, code in flight.errors(_FAILSAFE_BATT))
+        lost = flight.impact_s is not None or any(code for _, code in flight.errors(BATTERY_FAILSAFE))
         severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
         behind = _behind(flight)
         since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""

@@ -26,6 +26,7 @@ from care_core.ecosystems.ardupilot.statistics import (
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.spans import during, seconds_in
+from care_core.ecosystems.vehicles.errors import VIBRATION
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, quantile
 
@@ -67,7 +68,6 @@ _CALIBRATION = calibrated(
     "acceptable vibration",
 )
 _RAW_PROBABILITY = LIMITS.add("probability without VIBE", 0.6, "", "a choice: accelerations alone tell less")
-_FAILSAFE_VIBE = 29
 _SOURCE = "VIBE; limits 30 and 60 m/s^2: ArduPilot, Measuring Vibration"
 
 
@@ -150,7 +150,7 @@ def _clipping(table: Table, calm: np.ndarray) -> tuple[float, float]:
 
 def _severity(flight: Flight, peak: float, clips: float, is_upset: bool, has_risen: bool) -> Severity:
     """Critical where it is severe, made the firmware go over to its vibration failsafe, or upset the estimator."""
-    if peak > SEVERE or clips >= _MANY * _CLIPS or any(code for _, code in flight.errors(_FAILSAFE_VIBE)) or is_upset:
+    if peak > SEVERE or clips >= _MANY * _CLIPS or any(code for _, code in flight.errors(VIBRATION)) or is_upset:
         return "critical"
     return "warning" if peak > HIGH or clips >= _CLIPS or has_risen else "info"
 
