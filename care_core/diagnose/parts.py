@@ -14,6 +14,7 @@ from care_core.ecosystems.findings import (
     BY_STICK,
     CAME_DOWN,
     NO_BATTERY,
+    NO_MISSION,
     NOT_BEGUN,
     OWN_SUPPLY,
     UNCHARGED,
@@ -46,7 +47,7 @@ def never_flew(findings: Iterable[Finding]) -> bool:
     got no power, or nothing told it to lift."""
     found = tuple(every_finding(findings))
     return was_refused(found) or any(
-        one.title in (NOT_BEGUN, UNPOWERED) and one.severity == "critical" for one in found
+        one.title in (NO_MISSION, NOT_BEGUN, UNPOWERED) and one.severity == "critical" for one in found
     )
 
 

@@ -13,6 +13,9 @@ from collections.abc import Mapping
 from care_core.ecosystems.findings import (
     CAME_DOWN,
     NO_BATTERY,
+    NO_MISSION,
+    NO_POSITION_FOR,
+    NOT_BEGUN,
     OWN_SUPPLY,
     UNPOWERED,
     Finding,
@@ -74,6 +77,11 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
     (
         rf"power was lost|the log ends in the air|{re.escape(OWN_SUPPLY)}",
         "check the battery's connector, the power module and the autopilot's 5 V supply under load",
+    ),
+    (f"{NO_MISSION}|{NOT_BEGUN}", "upload the mission again, or start it anew, and see that the vehicle takes it"),
+    (
+        f"(.*){NO_POSITION_FOR}",
+        r"give it a source of position (GPS, optical flow, a camera), and wait for it before \1; Altitude needs none",
     ),
     (re.escape(NO_BATTERY), "check the power module's cable and BATT_MONITOR"),
     # --- robots

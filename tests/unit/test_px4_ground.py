@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from care_core.diagnose.parts import never_flew
-from care_core.ecosystems.findings import NOT_BEGUN, UNPOWERED, Finding, every_finding
+from care_core.ecosystems.findings import (
+    NO_MISSION,
+    NO_POSITION_FOR,
+    NOT_BEGUN,
+    SPINS,
+    UNPOWERED,
+    Finding,
+    every_finding,
+)
 from care_core.ecosystems.px4.examining import examine
+from care_core.ecosystems.px4.failsafes import in_words
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.logs.base import Table
 from care_core.run import Setting, Unavailable
@@ -66,6 +75,70 @@ def test_a_mission_that_asks_nothing_of_the_motors_never_began(mode: float, thru
         )
     ]
     assert (NOT_BEGUN in titles) == is_told
+
+
+@pytest.mark.parametrize(
+    ("said", "reached", "is_told"),
+    [("No valid mission available, loitering", -1, True), ("No valid mission available, loitering", 2, False),
+     ("Mission finished, loitering", -1, False)],
+)  # fmt: skip
+def test_a_mission_that_the_navigator_does_not_fly_is_told_in_its_words(said: str, reached: int, is_told: bool) -> None:
+    titles = [
+        one.title
+        for one in found(
+            vehicle_status=states(arming_state=[(0, 1), (10, 2), (30, 1)], nav_state=[(0, 0), (12, 4)],
+                                  failsafe=[(0, 0)]),
+            mission_result=states(finished=[(0, 1)], seq_reached=[(0, reached)], seq_total=[(0, 15)]),
+            logged_messages=Table(np.array([12.0]), {"level": np.array(["INFO"]), "message": np.array([said])}),
+        )
+    ]  # fmt: skip
+    assert (NO_MISSION in titles) == is_told
+
+
+POSITION_MODE, ALTITUDE_MODE = 2, 1
+
+
+@pytest.mark.parametrize(
+    ("intended", "known_s", "is_told"),
+    [(POSITION_MODE, 99.0, True), (POSITION_MODE, 5.0, False), (ALTITUDE_MODE, 99.0, False)],
+)  # fmt: skip
+def test_a_position_mode_without_a_position_is_told(intended: int, known_s: float, is_told: bool) -> None:
+    flags = states(
+        local_position_invalid=[(0, 1), (known_s, 0), (15, 1)] if known_s < 15 else [(0, 1)],
+        mode_req_local_position_relaxed=[(0, 1 << POSITION_MODE)],
+        offboard_control_signal_lost=[(0, 1)],
+        mode_req_offboard_signal=[(0, 1 << 14)],
+    )
+    status = states(
+        arming_state=[(0, 1), (10, 2), (50, 1)],
+        nav_state=[(0, 0), (20, ALTITUDE_MODE)],
+        nav_state_user_intention=[(0, 0), (20, intended)],
+        failsafe=[(0, 0), (20, 1)],
+    )
+    flight = Px4Flight(MadeLog({"vehicle_status": status, "failsafe_flags": flags}))
+    titles = [one.title for one in every_finding(examine(flight).findings)]
+    assert (f"Position{NO_POSITION_FOR}" in titles) == is_told
+    assert in_words(flight, 20.0) == ("position" if intended == POSITION_MODE else "")
+
+
+@pytest.mark.parametrize(
+    ("rate", "wanted", "thrust", "is_told"),
+    [(-3.5, 1.5, -0.3, True), (-3.5, -1.5, -0.3, False), (-1.0, 1.5, -0.3, False), (-3.5, 1.5, 0.0, False)],
+)  # fmt: skip
+def test_a_vehicle_that_spins_against_its_control_is_told(
+    rate: float, wanted: float, thrust: float, is_told: bool
+) -> None:
+    titles = [
+        one.title
+        for one in found(
+            vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 14)], failsafe=[(0, 0)]),
+            vehicle_land_detected=states(landed=[(0, 1), (12, 0), (48, 1)]),
+            vehicle_angular_velocity=states(**{"xyz[2]": [(0, 0.0), (30, rate), (34, 0.0)]}),
+            vehicle_rates_setpoint=states(yaw=[(0, 0.0), (30, wanted)]),
+            vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, 0.0), (12, thrust)]}),
+        )
+    ]
+    assert (SPINS in titles) == is_told
 
 
 def landing_on_the_way() -> Table:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from care_core.ecosystems.findings import Health
+from care_core.ecosystems.findings import Health, every_finding
 from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros import ECOSYSTEM
 from care_core.ecosystems.ros.checks import imu as felt
-from care_core.ecosystems.ros.checks import odometry
+from care_core.ecosystems.ros.checks import messages, odometry
 from care_core.ecosystems.ros.checks.messages import gist, reported
 from care_core.ecosystems.ros.messages import IMU, MESSAGES
 from care_core.ecosystems.ros.motion import odometry_of
@@ -373,6 +373,34 @@ def test_what_is_never_published_is_told_in_words() -> None:
     assert reported(silent) == "diagnostics: ekf_node publishes nothing on odometry/filtered"
     slow = Report(1.0, "/diagnostics", "gps: fix topic status", 2, "Frequency too low.")
     assert reported(slow) == "diagnostics: gps: fix topic status: Frequency too low"
+
+
+def severities(*reports: Report) -> dict[str, str]:
+    """How grave the errors of diagnostics are in a drive that records nothing else."""
+    drive = SimpleNamespace(reports=reports, duration_s=60.0, severity=lambda _at, most: most)
+    return {one.title.rpartition(": ")[2]: one.severity for one in messages._diagnostics(cast(Any, drive))}
+
+
+def test_no_receiver_of_satellites_from_first_to_last_leads_nowhere() -> None:
+    none = Report(1.0, "/diagnostics", "mavros: GPS", 2, "No satellites")
+    assert severities(none) == {"No satellites": "info"}
+    assert severities(Report(0.5, "/diagnostics", "mavros: GPS", 0, "3D fix"), none) == {"No satellites": "critical"}
+
+
+def test_a_device_that_another_node_has_open_is_there() -> None:
+    closed = Report(1.0, "/diagnostics", "joystick_raw: Joystick Driver Status", 2, "Joystick not open.")
+    opened = Report(1.0, "/diagnostics", "joy_node: Joystick Driver Status", 0, "OK")
+    assert severities(closed) == {"Joystick not open": "critical"}
+    assert severities(closed, opened) == {"Joystick not open": "warning"}
+
+
+def test_a_node_that_says_its_mission_failed_leads(tmp_path: Path) -> None:
+    said = [(5.0 + n, ERROR, "/bridge", f"stale {word}") for n, word in enumerate(("data", "clock", "map"))]
+    health = looked_at(
+        Drive(outcome=ABORTED, said=[*said, (20.0, ERROR, "/left_mission", "[ERROR] Mission failed!")]), tmp_path
+    )
+    (failed,) = [one for one in every_finding(health.findings) if "Mission failed" in one.title]
+    assert failed.severity == "critical"
 
 
 Change = Callable[[Any, float], None]

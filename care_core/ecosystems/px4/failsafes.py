@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from care_core.ecosystems.px4.flight import FLAGS, Px4Flight
+from care_core.ecosystems.px4.flight import FLAGS, STATUS, Px4Flight
 from care_core.logs.base import Wanted
 
 REASONS: Mapping[str, tuple[str, ...]] = {
@@ -17,7 +17,22 @@ REASONS: Mapping[str, tuple[str, ...]] = {
     "mission": ("mission_failure",),
     "wind": ("wind_limit_exceeded",),
 }
-READS: Wanted = {FLAGS: tuple(flag for flags in REASONS.values() for flag in flags)}
+_NEEDED = {
+    "local_position_invalid": ("mode_req_local_position", "mode_req_local_position_relaxed"),
+    "global_position_invalid": ("mode_req_global_position", "mode_req_global_position_relaxed"),
+    "offboard_control_signal_lost": ("mode_req_offboard_signal",),
+}
+"""Flags that are up in many a sound flight, each with the masks of modes (bits by nav_state) that need what it says is
+missing."""
+INTENDED = "nav_state_user_intention"
+"""The mode that was asked for; `nav_state` is the one that acts."""
+READS: Wanted = {
+    FLAGS: (
+        *(flag for flags in REASONS.values() for flag in flags),
+        *(mask for masks in _NEEDED.values() for mask in masks),
+    ),
+    STATUS: ("nav_state", INTENDED),
+}
 
 _CRITICAL_WARNING = {"battery_warning": 2}
 """battery_warning counts from critical on (battery_status.msg); the others are true or false."""
@@ -37,8 +52,19 @@ def reasons(flight: Px4Flight, acted_s: float) -> tuple[str, ...]:
     return tuple(
         about
         for about, flags in REASONS.items()
-        if any(flight.at_least(FLAGS, flag, _CRITICAL_WARNING.get(flag, 1), near) for flag in flags)
+        if any(
+            flight.at_least(FLAGS, flag, _CRITICAL_WARNING.get(flag, 1), near) and matters(flight, flag, acted_s)
+            for flag in flags
+        )
     )
+
+
+def matters(flight: Px4Flight, flag: str, t: float) -> bool:
+    """Whether the mode that was asked for at a time needs what a flag says is missing; true where the log does not tell
+    which modes do (before 1.14)."""
+    masks = [mask for name in _NEEDED.get(flag, ()) if (mask := flight.last(FLAGS, name, t)) is not None]
+    mode = flight.last(STATUS, INTENDED, t)
+    return not masks or mode is None or any(int(mask) >> int(mode) & 1 for mask in masks)
 
 
 def in_words(flight: Px4Flight, acted_s: float) -> str:
@@ -49,6 +75,7 @@ def in_words(flight: Px4Flight, acted_s: float) -> str:
         for flags in REASONS.values()
         for flag in flags
         if any(value > 0 and abs(t - acted_s) < _ROSE_S for t, value in flight.changes(FLAGS, flag))
+        and matters(flight, flag, acted_s)
     )
     words = [_LINKS.get(flag) or next(about for about, flags in REASONS.items() if flag in flags) for flag in rose]
     told = dict.fromkeys(words or reasons(flight, acted_s))

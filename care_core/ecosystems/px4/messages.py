@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from care_core.ecosystems.dictionary import Dictionary, Field, Message
+from care_core.ecosystems.px4 import failsafes
 from care_core.ecosystems.px4.checks import flags
+from care_core.ecosystems.px4.flight import FLAGS
 
 _SHARE = (0.0, 1.0)
 _LATITUDE, _LONGITUDE = (-90.0, 90.0), (-180.0, 180.0)
@@ -37,10 +39,15 @@ def _along(axes: str, unit: str, words: str) -> dict[str, Field]:
 
 MESSAGES: Dictionary = {
     **{topic: Message(fields) for topic, fields in _FLAGS.items()},
+    FLAGS: Message({
+        **{name: Field(label=name.replace("_", " ")) for name in failsafes.READS[FLAGS]},
+        **_FLAGS[FLAGS],
+    }),
     "vehicle_status": Message({
         **_FLAGS["vehicle_status"],
         "arming_state": Field(label="arming state"),
         "nav_state": Field(label="mode"),
+        failsafes.INTENDED: Field(label="mode that was asked for"),
         "failure_detector_status": Field(label="failures detected, as bits"),
         "vehicle_type": Field(label="kind of vehicle"),
     }),

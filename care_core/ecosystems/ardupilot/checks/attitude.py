@@ -17,7 +17,7 @@ from care_core.ecosystems.ardupilot.checks.thrust import saturated
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
 from care_core.ecosystems.ardupilot.statistics import lasting, means, parts, records, top
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.findings import SPINS, Finding, Severity
 from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median
@@ -215,7 +215,7 @@ def _spins(flight: Flight) -> Iterator[Finding]:
         )
         yield Finding(
             kind="attitude",
-            title="it spins against its control",
+            title=SPINS,
             onset_s=start,
             end_s=end,
             severity="critical",

@@ -23,7 +23,9 @@ from care_core.ecosystems.px4.checks import (
     not_numbers,
     recorded,
     rotors,
+    spin,
     twist,
+    unplaced,
     vibration,
 )
 from care_core.ecosystems.px4.flight import Px4Flight
@@ -32,6 +34,7 @@ CHECKS: tuple[Check[Px4Flight], ...] = (
     not_numbers.CHECK,
     flags.CHECK,
     estimator.CHECK,
+    unplaced.CHECK,
     motor.CHECK,
     rotors.CHECK,
     calibration.CHECK,
@@ -43,6 +46,7 @@ CHECKS: tuple[Check[Px4Flight], ...] = (
     battery.CHECK,
     changes.CHECK,
     attitude.CHECK,
+    spin.CHECK,
     crash.CHECK,
     blocked.CHECK,
     errors.CHECK,

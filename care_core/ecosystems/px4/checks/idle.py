@@ -1,4 +1,5 @@
-"""A mission that never began: armed in its mode, on the ground, and nothing was asked of the motors.
+"""A mission that never began: the navigator had none that it could fly, or the vehicle was armed in its mode, on the
+ground, and nothing was asked of the motors.
 
 The navigator flies no mission that it calls finished, and none that it cannot use; the vehicle then waits on the ground
 until the firmware disarms it (COM_DISARM_PRFLT). No parameter of its flight has to do with that.
@@ -6,13 +7,14 @@ until the firmware disarms it (COM_DISARM_PRFLT). No parameter of its flight has
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import NOT_BEGUN, Finding
-from care_core.ecosystems.px4.flight import LANDED, RESULT, Px4Flight
+from care_core.ecosystems.findings import NO_MISSION, NOT_BEGUN, Finding
+from care_core.ecosystems.px4.flight import LANDED, MESSAGES, RESULT, Px4Flight
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
@@ -23,7 +25,9 @@ READS: Wanted = {
     RESULT: ("finished", "seq_reached"),
     _THRUST: ("xyz[2]",),
     _OLD_THRUST: ("thrust_body[2]",),
+    MESSAGES: ("message",),
 }
+_NO_MISSION = re.compile(r"no valid mission available", re.IGNORECASE)
 LIMITS = Limits()
 _IDLES = LIMITS.add("thrust that is asked for on the ground", 0.1, "", "MPC_THR_MIN is 0.12 as shipped")
 _WAITS_S = LIMITS.add("shortest time armed", 3.0, "s", "a choice: COM_SPOOLUP_TIME is 1 s as shipped, and margin")
@@ -31,8 +35,12 @@ _SURE = LIMITS.add("probability that it was not begun", 0.9, "", "nothing was as
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
-    """One finding for the first time that it was armed for a mission and lifted nothing."""
+    """One finding for the first time that it was armed for a mission and flew none of it."""
     for span in flight.armed if flight.hovers else ():
+        refused = _refused(flight, span)
+        if refused is not None:
+            yield refused
+            return
         ways = {way_of("px4", mode) for mode in flight.modes_during(span)}
         asked = _most_asked(flight, span)
         stays = flight.during(LANDED, "landed", span) is not None and not flight.ever(LANDED, "landed", 0, span)
@@ -51,6 +59,25 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
                 probability=_SURE,
             )
             return
+
+
+def _refused(flight: Px4Flight, span: Span) -> Finding | None:
+    """A mission that the navigator does not fly, by its own words, and of which no item was ever reached."""
+    said = ((t, text) for t, _, text in flight.messages if span[0] <= t <= span[1] and _NO_MISSION.search(text))
+    first = next(said, None)
+    if first is None or flight.at_least(RESULT, "seq_reached", 0, span):
+        return None
+    return Finding(
+        kind="software",
+        title=NO_MISSION,
+        onset_s=first[0],
+        end_s=span[1],
+        severity="critical",
+        evidence=f"the firmware says: {first[1]}; upload the mission again, or start it anew",
+        source=f"{MESSAGES}, {RESULT}",
+        suspect="operation",
+        probability=_SURE,
+    )
 
 
 def _most_asked(flight: Px4Flight, span: Span) -> float | None:

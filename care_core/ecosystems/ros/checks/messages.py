@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
@@ -36,6 +36,10 @@ _ABOUT: tuple[tuple[re.Pattern[str], FindingKind], ...] = (
 _OF_TOPIC = re.compile(r"(?P<node>.+?): (?P<topic>\S+) topic status")
 _NOTHING = "No events recorded"
 """How diagnostic_updater names what it watches of a topic, and what it says where that was never published."""
+_NO_RECEIVER = re.compile(r"mavros: (GPS: no (satellites|fix)|System: sensor health)", re.IGNORECASE)
+"""What MAVROS reports from first to last where no receiver is connected, or none sees the sky: that leads nowhere."""
+_MISSION_FAILED = re.compile(r"\bmission (has )?failed\b", re.IGNORECASE)
+"""How a node of missions says that it did not do what the robot was sent for."""
 _TRACEBACK = "Traceback (most recent call last)"
 _RAISED = re.compile(r'File "(?:.*/)?([^/"]+)", line (\d+), in (\w+)')
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
@@ -59,19 +63,33 @@ def _diagnostics(drive: Drive) -> Iterator[Finding]:
         last[report.name] = report
         if report.level >= BAD:
             worst.setdefault(report.name, []).append(report)
+    bad_all_along = worst.keys() - {report.name for report in drive.reports if report.level < BAD}
     for name, bad in sorted(worst.items(), key=lambda item: item[1][0].time_s)[:MOST]:
         first, stays = bad[0], last[name].level >= BAD
+        aside = _leads_nowhere(first, bad_all_along) or _another_works(name, last)
         again = (f", {len(bad)} times" if len(bad) > 1 else "") + (", and so to the end" if stays else "")
         yield Finding(
             kind=about(f"{name} {first.message}"),
             title=reported(first),
             onset_s=first.time_s,
             end_s=drive.duration_s if stays else last[name].time_s,
-            severity=drive.severity(first.time_s, "critical" if first.level == BAD else "warning"),
+            severity=aside or drive.severity(first.time_s, "critical" if first.level == BAD else "warning"),
             evidence=f'{first.word} "{first.message}"{again}',
             source=first.topic,
             probability=0.7,
         )
+
+
+def _leads_nowhere(report: Report, bad_all_along: Collection[str]) -> Severity | None:
+    is_absent = report.name in bad_all_along and _NO_RECEIVER.match(f"{report.name}: {report.message}")
+    return "info" if is_absent else None
+
+
+def _another_works(name: str, last: Mapping[str, Report]) -> Severity | None:
+    """A second node for one device cannot open what the first holds: the device is there."""
+    _, parted, device = name.partition(": ")
+    alike = (report for other, report in last.items() if parted and other != name and other.endswith(f": {device}"))
+    return "warning" if any(report.level == 0 for report in alike) else None
 
 
 def reported(report: Report) -> str:
@@ -91,7 +109,9 @@ def _errors(drive: Drive) -> Iterator[Finding]:
         if message.level >= Level.ERROR and not is_known:
             kinds.setdefault((message.node, _NUMBER.sub("#", text)), []).append(message)
     fatal_s = max((message.time_s for message in messages if message.level >= Level.FATAL), default=None)
-    ranked = sorted(kinds.values(), key=lambda alike: (-alike[0].level, alike[0].time_s))
+    ranked = sorted(
+        kinds.values(), key=lambda alike: (not _MISSION_FAILED.search(alike[0].text), -alike[0].level, alike[0].time_s)
+    )
     for alike in ranked[:MOST]:
         first = alike[0]
         times = f", {len(alike)} times" if len(alike) > 1 else ""
@@ -109,7 +129,8 @@ def _errors(drive: Drive) -> Iterator[Finding]:
 
 def _severity(drive: Drive, first: LogMessage, fatal_s: float | None) -> Severity:
     """An error that a fatal one follows led to it, as far as anybody can say."""
-    if first.level >= Level.FATAL or (fatal_s is not None and first.time_s <= fatal_s):
+    is_fatal = first.level >= Level.FATAL or (fatal_s is not None and first.time_s <= fatal_s)
+    if is_fatal or _MISSION_FAILED.search(first.text):
         return drive.severity(first.time_s, "critical")
     return "info" if drive.goals else "warning"
 

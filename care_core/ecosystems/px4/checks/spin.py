@@ -1,0 +1,55 @@
+"""A multicopter that spins the other way than its control asks for: it has no say in its heading any more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import SPINS, Finding
+from care_core.ecosystems.px4.flight import LANDED, Px4Flight
+from care_core.ecosystems.spans import inside, runs
+from care_core.logs.base import Wanted
+
+_RATE, _ASKED, _THRUST = "vehicle_angular_velocity", "vehicle_rates_setpoint", "vehicle_thrust_setpoint"
+READS: Wanted = {_RATE: ("xyz[2]",), _ASKED: ("yaw",), _THRUST: ("xyz[2]",), LANDED: ("landed",)}
+LIMITS = Limits()
+_SPINS_DPS = LIMITS.add("turn against its control", 90.0, "deg/s", "a choice: a gust or a swing turns it slower")
+_SPINS_S = LIMITS.add("shortest turn against its control", 2.0, "s", "a choice: a blow is countered sooner")
+_GAP_S = LIMITS.add("pause that still counts as one turn", 0.5, "s", "a choice: the demand flickers around a target")
+_LIFTS = LIMITS.add("thrust that flies", 0.1, "", "MPC_THR_MIN is 0.12 as shipped; what is carried asks for none")
+_HELD = LIMITS.add("probability of a part", 0.3, "", "a choice: what holds or strikes it shows alike")
+
+
+def find(flight: Px4Flight) -> Iterator[Finding]:
+    """The first such turn that lasts."""
+    turned, asked = flight.table(_RATE, "xyz[2]"), flight.table(_ASKED, "yaw")
+    thrust, landed = flight.table(_THRUST, "xyz[2]"), flight.table(LANDED, "landed")
+    if turned is None or asked is None or thrust is None or landed is None or not flight.hovers:
+        return
+    t, rate = turned.t, np.nan_to_num(np.degrees(turned["xyz[2]"]))
+    wanted = np.interp(t, asked.t, np.nan_to_num(asked["yaw"]))
+    flies = (np.interp(t, thrust.t, np.nan_to_num(-thrust["xyz[2]"])) > _LIFTS) & inside(flight.armed, t)
+    flies &= (np.interp(t, landed.t, landed["landed"]) == 0) & (t < min(flight.kills, default=np.inf))
+    against = flies & (np.abs(rate) > _SPINS_DPS) & (rate * wanted < 0)
+    span = next((one for one in runs(t, against, _GAP_S) if one[1] - one[0] >= _SPINS_S), None)
+    if span is None:
+        return
+    most = float(np.max(np.abs(rate[(t >= span[0]) & (t <= span[1])])))
+    yield Finding(
+        kind="attitude",
+        title=SPINS,
+        onset_s=span[0],
+        end_s=span[1],
+        severity="critical",
+        evidence=(
+            f"it turns at up to {most:.0f} deg/s for {span[1] - span[0]:.1f} s while it is told to turn the other way "
+            f"(limit {_SPINS_DPS:g}): something holds or struck it, a motor gave way, or motors turn the wrong way"
+        ),
+        source=f"{_RATE}.xyz[2], {_ASKED}.yaw",
+        probability=_HELD,
+    )
+
+
+CHECK = Check("spin", "a multicopter that spins against its control", READS, LIMITS, find)
