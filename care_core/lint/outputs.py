@@ -11,16 +11,16 @@ from itertools import combinations
 import numpy as np
 
 from care_core.lint.problems import Entry, LintedFile, Problem
+from care_core.metadata.output_functions import LEFT, MOTORS, RIGHT, STEERING, THROTTLE
 
 Values = Mapping[str, Entry]
 
 _MOTORS = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 12: 12, 14: 10}
 """Motors by FRAME_CLASS (AP_MotorsMatrix.cpp)."""
-_MOTOR_FUNCTIONS = (*range(33, 41), *range(82, 86))
-"""SERVOn_FUNCTION of motors 1 to 12 (SRV_Channel.h)."""
 _HALVES = (
-    (70, 26, "SERVO1_FUNCTION", "steering (26)"), (26, 70, "SERVO3_FUNCTION", "throttle (70)"),
-    (73, 74, "", "the right side (74)"), (74, 73, "", "the left side (73)"),
+    (THROTTLE, STEERING, "SERVO1_FUNCTION", f"steering ({STEERING})"),
+    (STEERING, THROTTLE, "SERVO3_FUNCTION", f"throttle ({THROTTLE})"),
+    (LEFT, RIGHT, "", f"the right side ({RIGHT})"), (RIGHT, LEFT, "", f"the left side ({LEFT})"),
 )  # fmt: skip
 """Functions of which one goes with the other, and the output that has that one where the file leaves it at 0."""
 _OUTPUTS = range(1, 15)
@@ -111,7 +111,7 @@ def _motors(file: LintedFile, values: Values) -> Iterator[Problem]:
     driven = Counter(int(entry.number or 0) for entry in outputs.values())
     is_plane = _whole(values, "Q_ENABLE") == 1
     frame = _whole(values, "Q_FRAME_CLASS" if is_plane else "FRAME_CLASS")
-    wanted = _MOTOR_FUNCTIONS[: _MOTORS.get(frame or 0, 0)]
+    wanted = tuple(MOTORS.values())[: _MOTORS.get(frame or 0, 0)]
     if not ("MOT_SPIN_ARM" in values or is_plane) or not any(driven[one] for one in wanted):
         return
     missing = [place for place, function in enumerate(wanted, start=1) if not driven[function]]
@@ -140,8 +140,8 @@ def _wheels(file: LintedFile, values: Values) -> Iterator[Problem]:
         if one in held and other not in held and is_taken and _whole(values, "SAIL_ENABLE") != 1:
             text = f"{held[one].name} is {one}, and no output has {what}: it refuses to arm."
             hint = "Assign the other as well."
-            if {73, 74} <= set(held):
-                hint = "Set it to 0: 73 and 74 drive and steer."
+            if {LEFT, RIGHT} <= set(held):
+                hint = f"Set it to 0: {LEFT} and {RIGHT} drive and steer."
             yield _warning(file, held[one], text, hint, "AP_MotorsUGV.cpp, pre_arm_check")
 
 

@@ -16,6 +16,7 @@ from typing import Literal, get_args
 from care_core.files import read_small_text
 from care_core.metadata.aliases import alias_in
 from care_core.metadata.fact import expanded
+from care_core.metadata.output_functions import MOTORS
 from care_core.records import Record
 
 TABLE = Path(__file__).with_name("ardupilot_refusals.tsv")
@@ -136,10 +137,10 @@ class _Row(Record):
 
 
 def _filled(pattern: str, number: str) -> str:
-    """A pattern with the number of its refusal, and with the function of that motor's output (SRV_Channel.h)."""
+    """A pattern with the number of its refusal, and with the function of that motor's output."""
     motor = int(number or 0)
     filled = pattern.replace("{n}", number).replace("{k}", "" if motor == 1 else number)
-    return filled.replace("{m}", str(motor + (32 if motor <= 8 else 73)))
+    return filled.replace("{m}", str(MOTORS.get(motor, 0)))
 
 
 def _must(text: str) -> Must:

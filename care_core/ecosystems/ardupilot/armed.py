@@ -13,6 +13,7 @@ from care_core.ecosystems.ardupilot.recorded import Recorded
 from care_core.ecosystems.spans import Span, during, runs
 from care_core.ecosystems.vehicles import method_words, unrecorded_changes
 from care_core.logs.base import Table, Wanted
+from care_core.metadata.output_functions import LEFT, MOTORS, RIGHT, THROTTLE
 from care_core.numbers import Bools, Floats, median
 
 READS: Wanted = {
@@ -40,8 +41,7 @@ _ALIVE_M, _ON_GROUND_M, _APART_M = 0.05, 1.2, 3.0
 """A barometer that moves by more lives, and by less than the second on the ground, propellers and all."""
 _MOVES_MS, _AROUND_S = 3.0, 10.0
 """Faster, it taxies or flies; so long before and after belongs to it."""
-_MOTORS = frozenset((*range(33, 41), *range(82, 86), 70, 73, 74))
-"""SERVOn_FUNCTION of motors and throttles (SRV_Channel.h)."""
+_DRIVES = frozenset((*MOTORS.values(), THROTTLE, LEFT, RIGHT))
 _LEAST_PWM, _WORKS_PWM = 1000.0, 150.0
 """Microseconds; so far above the least of an output is more than idling (MOT_SPIN_ARM 0.1 of 1000)."""
 _BY_ITSELF = frozenset(("mission", "return", "guided"))
@@ -146,7 +146,7 @@ class Armed(Recorded):
     def _motors_work(self) -> bool:
         """Whether an output that drives a motor ever left its least."""
         table = self.one("RCOU", "C1")
-        outputs = [n for n in range(1, 15) if self.setting(f"SERVO{n}_FUNCTION") in _MOTORS] if table else []
+        outputs = [n for n in range(1, 15) if self.setting(f"SERVO{n}_FUNCTION") in _DRIVES] if table else []
         return table is not None and any(
             f"C{n}" in table.columns
             and np.nanmax(table[f"C{n}"]) > (self.setting(f"SERVO{n}_MIN") or _LEAST_PWM) + _WORKS_PWM

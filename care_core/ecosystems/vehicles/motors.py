@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 
 from care_core.ecosystems.vehicles.frames import Arm, arms_of, frame_of
 from care_core.ecosystems.vehicles.settings import Driven, code
+from care_core.metadata.output_functions import LEFT, MOTORS, RIGHT, STEERING
 from care_core.records import Record
 
-_FUNCTIONS = {**{32 + n: n for n in range(1, 9)}, **{73 + n: n for n in range(9, 13)}}
-"""SERVOn_FUNCTION -> motor number: k_motor1 to k_motor8 are 33 to 40, k_motor9 to k_motor12 are 82 to 85
-(SRV_Channel.h)."""
+_DRIVEN = {function: motor for motor, function in MOTORS.items()}
+"""SERVOn_FUNCTION -> motor number."""
 _ARDUPILOT_FUNCTION, _PX4_FUNCTION = re.compile(r"SERVO\d+_FUNCTION"), re.compile(r"\w+_FUNC\d+")
 _OUTPUTS = 32
 _ON_AXIS_DEG = 10.0
@@ -38,8 +38,8 @@ def motor_outputs(settings: Driven) -> dict[int, int]:
     outputs: dict[int, int] = {}
     for output in range(1, _OUTPUTS + 1):
         function = code(settings, f"SERVO{output}_FUNCTION")
-        if function in _FUNCTIONS:
-            outputs.setdefault(_FUNCTIONS[function], output)
+        if function in _DRIVEN:
+            outputs.setdefault(_DRIVEN[function], output)
     return outputs
 
 
@@ -49,18 +49,18 @@ def switched_off(parameter: str, before: float | str, after: float | str) -> int
     if not isinstance(before, (int, float)) or before == after:
         return None
     if _ARDUPILOT_FUNCTION.fullmatch(parameter):
-        return _FUNCTIONS.get(int(before))
+        return _DRIVEN.get(int(before))
     is_motor = _PX4_FUNCTION.fullmatch(parameter) is not None and before in range(101, 113)
     return int(before) - 100 if is_motor else None
 
 
 def is_skid_steered(settings: Driven) -> bool | None:
-    """Whether a ground vehicle steers by driving its sides apart (SRV_Channel.h: k_throttleLeft 73, k_throttleRight
-    74), rather than by a steered wheel or rudder (k_steering 26); None where no parameter says."""
+    """Whether a ground vehicle steers by driving its sides apart, rather than by a steered wheel or rudder; None where
+    no parameter says."""
     functions = {code(settings, f"SERVO{output}_FUNCTION") for output in range(1, _OUTPUTS + 1)}
-    if {73, 74} <= functions:
+    if {LEFT, RIGHT} <= functions:
         return True
-    return False if 26 in functions else None
+    return False if STEERING in functions else None
 
 
 def motors_of(settings: Driven, motors: int | None = None) -> tuple[Motor, ...]:

@@ -19,6 +19,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import Span, during, runs
 from care_core.ecosystems.vehicles import motor_outputs
 from care_core.logs.base import Table, Wanted
+from care_core.metadata.output_functions import LEFT, MOTORS, RIGHT, TILTS
 from care_core.numbers import Bools, median
 
 READS: Wanted = {
@@ -52,9 +53,7 @@ _RESTS_BY_US = LIMITS.add("pulse off that", 50.0, "us", "a motor at full throttl
 _AXES = (("roll", "R"), ("pitch", "P"), ("yaw", "Y"))
 _USUAL_TYPES, _USUAL_CLASSES = frozenset((0.0, 1.0)), frozenset((1.0, 2.0))
 """FRAME_TYPE of plus and X, FRAME_CLASS of quad and hexa (AP_Motors_Class.h): every other is one of few vehicles."""
-_FIRST_MOTOR = 33
-_THRUSTERS = frozenset((*range(33, 41), *range(82, 86), 73, 74, 75, 76))
-"""SERVOn_FUNCTION of motors, of throttles left and right and of what tilts them (SRV_Channel.h)."""
+_THRUSTERS = frozenset((*MOTORS.values(), LEFT, RIGHT, *TILTS))
 _IDLED = "after idling on the ground"
 
 
@@ -121,7 +120,7 @@ def _layout(flight: Flight) -> dict[str, float | None]:
     outputs = motor_outputs(flight.settings)
     swapped = {output: motor for motor, output in outputs.items() if motor != output and output in outputs}
     if not found and sorted(outputs.values()) == list(range(1, len(outputs) + 1)):
-        found |= {f"SERVO{output}_FUNCTION": float(_FIRST_MOTOR - 1 + output) for output in sorted(swapped)}
+        found |= {f"SERVO{output}_FUNCTION": float(MOTORS[output]) for output in sorted(swapped)}
     return found
 
 

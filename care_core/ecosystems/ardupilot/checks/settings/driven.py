@@ -17,6 +17,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
 from care_core.metadata.ardupilot import firmware_default
+from care_core.metadata.output_functions import LEFT, RIGHT, STEERING, THROTTLE
 from care_core.numbers import Bools
 
 READS: Wanted = {"THR": ("ThrOut", "DesSpeed", "Speed"), "STER": ("SteerOut", "TurnRate")}
@@ -38,9 +39,8 @@ _SURE = LIMITS.add("probability of the parameter", 0.95, "", "no other explains 
 
 _AUTO = 10
 """Number of the mode that runs missions (Rover/mode.h)."""
-_STEERING, _THROTTLE, _BALANCE_BOT = 26, 70, 3
-_SIDES = (73, 74)
-"""Functions of the wheels on the left and on the right (SRV_Channel.h)."""
+_BALANCE_BOT = 3
+_SIDES = (LEFT, RIGHT)
 _FULL = 4500.0
 """SteerOut of full steering (AR_Motors)."""
 _SET_OFF = ("AUTO_KICKSTART", "AUTO_TRIGGER_PIN")
@@ -83,7 +83,7 @@ def _backwards(flight: Flight, driven: Table) -> Iterator[Finding]:
     against = moves & asks & (np.sign(driven["ThrOut"]) != np.sign(driven["Speed"]))
     fleeing = moves & asks & (np.sign(driven["DesSpeed"]) != np.sign(driven["Speed"])) & ~against
     by_itself = flight.drives_itself(driven.t)
-    outputs = _outputs(flight, _THROTTLE)
+    outputs = _outputs(flight, THROTTLE)
     if (spans := lasting(driven.t, by_itself & against, _LASTS_S)) and len(outputs) == 1:
         yield _told(
             flight, *_reversed(flight, outputs[0]), spans[0], "it drives against its throttle",
@@ -102,7 +102,7 @@ def _steered_against(flight: Flight, driven: Table, steered: Table) -> Iterator[
     speed = np.interp(steered.t, driven.t, driven["Speed"])
     moves = (speed > _MOVES_MS) & flight.drives_itself(steered.t)
     asked, turned, t = steered["SteerOut"][moves], steered["TurnRate"][moves], steered.t[moves]
-    outputs = _outputs(flight, _STEERING)
+    outputs = _outputs(flight, STEERING)
     if len(t) < _RECORDS or len(outputs) != 1 or np.std(turned) < _TURNS_DPS or not np.std(asked):
         return
     agrees = float(np.corrcoef(asked, turned)[0, 1])

@@ -17,6 +17,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Wanted
 from care_core.metadata.ardupilot import firmware_default
+from care_core.metadata.output_functions import LEFT, RIGHT, STEERING, THROTTLE
 from care_core.numbers import Bools, Floats
 from care_core.records import Record
 from care_core.run import shown
@@ -52,8 +53,6 @@ _ENDS = LIMITS.add("probability of an end", 0.85, "", "a choice: a weak motor wo
 _RADIUS = LIMITS.add("probability of TURN_RADIUS", 0.9, "", "it is measured")
 _RADIUS_LOST = LIMITS.add("probability that it costs the mission", 0.3, "", "a choice: corners alone suffer")
 
-_STEERING, _THROTTLE, _LEFT, _RIGHT = 26, 70, 73, 74
-"""Functions of the outputs (SRV_Channel.h)."""
 _MIDDLE_US = 1500.0
 
 
@@ -144,7 +143,7 @@ def _wrong(flight: Flight, drive: _Drive) -> Iterator[Neutral]:
 
 def _straight(flight: Flight, drive: _Drive) -> Iterator[tuple[str, int, float, float]]:
     """The steering's output at which it drives straight, with its error."""
-    output = _output(flight, drive, _STEERING)
+    output = _output(flight, drive, STEERING)
     if output is None:
         return
     moves = drive.speed > _MOVES_MS
@@ -156,7 +155,7 @@ def _straight(flight: Flight, drive: _Drive) -> Iterator[tuple[str, int, float, 
 
 def _at_rest(flight: Flight, drive: _Drive) -> Iterator[tuple[str, int, float, float]]:
     """The throttle's output at which it is not driven."""
-    output = _output(flight, drive, _THROTTLE)
+    output = _output(flight, drive, THROTTLE)
     if output is None:
         return
     told = drive.outputs[output] - _MIDDLE_US
@@ -167,7 +166,7 @@ def _at_rest(flight: Flight, drive: _Drive) -> Iterator[tuple[str, int, float, f
 
 def _wheels_at_rest(flight: Flight, drive: _Drive) -> Iterator[tuple[str, int, float, float]]:
     """The outputs of a skid-steered vehicle at which it neither turns nor is driven."""
-    left, right = _output(flight, drive, _LEFT), _output(flight, drive, _RIGHT)
+    left, right = _output(flight, drive, LEFT), _output(flight, drive, RIGHT)
     if left is None or right is None:
         return
     told = [drive.outputs[n] - _MIDDLE_US for n in (left, right)]
@@ -232,7 +231,7 @@ def _ends(flight: Flight, drive: _Drive) -> Iterator[Finding]:
     slow = (np.abs(drive.wanted_speed) > _MOVES_MS) & (np.abs(drive.speed) < _LACKS * np.abs(drive.wanted_speed))
     turns = np.abs(drive.wanted_dps) > np.degrees(_MOVES_MS) / 10
     wide = turns & (np.abs(drive.turn_dps) < _LACKS * np.abs(drive.wanted_dps))
-    for function, lacks in ((_STEERING, wide), (_THROTTLE, slow), (_LEFT, slow | wide), (_RIGHT, slow | wide)):
+    for function, lacks in ((STEERING, wide), (THROTTLE, slow), (LEFT, slow | wide), (RIGHT, slow | wide)):
         output = _output(flight, drive, function)
         for end in ("MIN", "MAX") if output is not None else ():
             name = f"SERVO{output}_{end}"
@@ -268,7 +267,7 @@ def _end_finding(drive: _Drive, name: str, value: float, default: float, share: 
 
 def _radius(flight: Flight, drive: _Drive) -> Iterator[Finding]:
     """TURN_RADIUS against the turn that the steering gives at its end."""
-    output, said = _output(flight, drive, _STEERING), flight.setting("TURN_RADIUS")
+    output, said = _output(flight, drive, STEERING), flight.setting("TURN_RADIUS")
     if output is None or not said:
         return
     moves = drive.speed > _MOVES_MS

@@ -17,6 +17,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during, runs
 from care_core.logs.base import Wanted
+from care_core.metadata.output_functions import LEFT, RIGHT, STEERING, THROTTLE
 from care_core.run import shown
 
 READS: Wanted = {
@@ -36,8 +37,7 @@ _PIVOT_S = LIMITS.add("shortest delay that is told", 3.0, "s", "a choice: shorte
 _LONG = LIMITS.add("share of the drive that loses the mission", 0.2, "", "missions are given 1.3 times their time")
 _SURE = LIMITS.add("probability of the parameter", 0.95, "", "it is measured")
 _LOST = LIMITS.add("probability that shorter stands lose it", 0.3, "", "a choice")
-_DRIVES = frozenset((26, 70, 73, 74))
-"""Functions of the outputs that drive and steer (SRV_Channel.h)."""
+_DRIVES = frozenset((STEERING, THROTTLE, LEFT, RIGHT))
 _MIDDLE_US = 1500.0
 _DELAY = "WP_PIVOT_DELAY"
 

@@ -15,6 +15,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted, merge_needs
+from care_core.metadata.output_functions import AILERONS, ELEVATOR, RUDDER
 from care_core.numbers import Floats
 from care_core.records import Record
 from care_core.run import shown
@@ -31,10 +32,9 @@ _FAR_DEG = LIMITS.add("bank that loses a mission", 20.0, "deg", "2 of 2 simulate
 _SURE = LIMITS.add("probability of the trim", 0.9, "", "it is measured")
 _LOST = LIMITS.add("probability that a smaller one loses the mission", 0.3, "", "a choice: its way is off in turns")
 
-_RUDDER, _MIDDLE_US = 21, 1500.0
-"""Function of the output (SRV_Channel.h), and what its trim is as shipped."""
-_AILERONS = 4
-_HELD = {_AILERONS: ("the ailerons", "their"), 19: ("the elevator", "its")}
+_MIDDLE_US = 1500.0
+"""The trim of an output as shipped."""
+_HELD = {AILERONS: ("the ailerons", "their"), ELEVATOR: ("the elevator", "its")}
 """Functions of the outputs that the autopilot holds a plane straight with."""
 _ENDS_US = (("MIN", 1100.0), ("MAX", 1900.0))
 """Ends of an output as shipped."""
@@ -70,7 +70,7 @@ class _Surface(Record):
 def find(flight: Flight) -> Iterator[Finding]:
     """Surfaces whose trims are not their middles."""
     for surface in _off(flight):
-        found = _of_rudder(flight, surface) if surface.function == _RUDDER else _of_held(surface)
+        found = _of_rudder(flight, surface) if surface.function == RUDDER else _of_held(surface)
         if found is not None:
             yield found
 
@@ -83,7 +83,7 @@ def _off(flight: Flight) -> Iterator[_Surface]:
     for n in range(1, 15) if len(t) else ():
         function, name = flight.setting(f"SERVO{n}_FUNCTION"), f"SERVO{n}_TRIM"
         trim, default = flight.setting(name), flight.default_left(name)
-        if function not in (*_HELD, _RUDDER) or f"C{n}" not in told.columns or trim is None:
+        if function not in (*_HELD, RUDDER) or f"C{n}" not in told.columns or trim is None:
             continue
         middle = _MIDDLE_US if default is None else default
         if abs(trim - middle) >= _OFF_US:
@@ -94,8 +94,8 @@ def _off(flight: Flight) -> Iterator[_Surface]:
 
 def _of_held(surface: _Surface) -> Finding | None:
     """Ailerons or an elevator that the autopilot holds off their trim."""
-    least = _HELD_US if surface.function == _AILERONS else _TRIMS_US
-    if surface.off_us < least or not (surface.is_default_meant or surface.function == _AILERONS):
+    least = _HELD_US if surface.function == AILERONS else _TRIMS_US
+    if surface.off_us < least or not (surface.is_default_meant or surface.function == AILERONS):
         return None
     is_far = surface.off_us > _FAR * surface.travel
     wanted = surface.default if surface.is_default_meant else float(round(surface.held))
