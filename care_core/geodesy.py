@@ -1,4 +1,5 @@
-"""Places on the globe as metres on a plane around one of them: exact to centimetres over a few kilometres."""
+"""The earth: places on it as metres on a plane around one of them, exact to centimetres over a few kilometres, and what
+things weigh there."""
 
 from __future__ import annotations
 
@@ -11,6 +12,8 @@ if TYPE_CHECKING:
 
 METRES_PER_DEGREE = 111_319.49
 """Of latitude, and of longitude at the equator (WGS 84)."""
+GRAVITY = 9.81
+"""m/s^2, within 0.03 anywhere on the ground."""
 
 Coordinate = TypeVar("Coordinate", float, "Floats")
 """Of one place, or of many, shape (n,)."""

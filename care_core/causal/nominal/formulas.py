@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from care_core.geodesy import GRAVITY
 from care_core.numbers import Floats
 from care_core.records import Record
 
 Given = Mapping[str, Floats]
 """Arguments of a formula by their names, each of shape (n,)."""
 
-GRAVITY = 9.81
 SCALES = {"cm": 0.01, "cm/s": 0.01, "cm/s/s": 0.01, "cdeg": 0.01, "ms": 0.001, "gravities": GRAVITY}
 """From a variable's unit to that of a formula's argument."""
 TINY = 1e-6

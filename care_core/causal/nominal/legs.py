@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from care_core.causal.nominal.formulas import GRAVITY, TINY, Given
+from care_core.causal.nominal.formulas import TINY, Given
+from care_core.geodesy import GRAVITY
 from care_core.numbers import Floats
 
 LEGS = (

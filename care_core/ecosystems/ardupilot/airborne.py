@@ -21,6 +21,7 @@ from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.spans import Span, during, inside, runs, within
 from care_core.ecosystems.vehicles import flies
 from care_core.ecosystems.vehicles.errors import CRASH_CHECK
+from care_core.geodesy import GRAVITY
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, pieces
 
@@ -54,7 +55,6 @@ _CLIMBS_M = 20.0
 """A copter that has hit the ground cannot climb so far, whatever its estimator reports."""
 _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
-_GRAVITY = 9.81
 _SHOCK, _HARD = 30.0, 5.0
 """m/s^2: three times gravity is no flight, and so many times that is no motor that broke."""
 _STOPS_S, _MOVES_MS, _STOPPED = 0.8, 2.5, 0.3
@@ -277,7 +277,7 @@ class Airborne(Armed):
                 before = tilt[(t >= since) & (t < start)]
                 throttle = driven[1][(driven[0] >= since) & (driven[0] <= start)]
                 last = felt[(table.t > end - _LIES_S + _STRUCK_S) & (table.t <= end)]
-                is_at_rest = len(last) > 2 and float(np.max(np.abs(last - _GRAVITY))) < _STILL
+                is_at_rest = len(last) > 2 and float(np.max(np.abs(last - GRAVITY))) < _STILL
                 was_upright = float(np.min(before, initial=UPSIDE_DOWN_DEG)) < _ON_SIDE_DEG
                 if is_at_rest and was_upright and float(np.max(throttle, initial=0.0)) > _TURNS:
                     return start

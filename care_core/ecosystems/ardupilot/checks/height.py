@@ -16,6 +16,7 @@ from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import Span, during
+from care_core.geodesy import GRAVITY
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Floats, median, quantile
 
@@ -25,7 +26,7 @@ READS: Wanted = {"IMU": _AXES, "GPS": ("Alt", "Status")}
 LIMITS = Limits()
 _APART_M = LIMITS.add("estimate off the barometer", 5.0, "m", "five times what arming allows")
 _LASTS_S = LIMITS.add("shortest time of it", 5.0, "s", "a choice: a descent through its own wash is over sooner")
-_GRAVITY = LIMITS.add("gravity", 9.81, "m/s^2", "physics")
+_GRAVITY = LIMITS.add("gravity", GRAVITY, "m/s^2", "physics")
 _OFF = LIMITS.add("gravity off, at rest", 0.5, "m/s^2", "a choice: a calibrated accelerometer is within 0.1")
 _FAR_OFF = LIMITS.add("gravity far off, at rest", 1.0, "m/s^2", "MPU-6000, not calibrated: 0.8 on one axis")
 _REST = LIMITS.add("throttle at rest", 0.05, "", "a choice: motors that idle shake little")

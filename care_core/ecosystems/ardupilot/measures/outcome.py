@@ -27,6 +27,7 @@ from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
 from care_core.ecosystems.vehicles.arming import CUT, NEVER_ARMED
 from care_core.ecosystems.vehicles.way import AIRBORNE_M
+from care_core.geodesy import GRAVITY
 from care_core.logs.base import Wanted
 from care_core.numbers import Floats
 from care_core.run import OutcomeCheck, Unavailable, Value, is_known
@@ -47,7 +48,7 @@ _TOUCHED_S, _SWITCHED_OFF_S = 5.0, 0.05
 """Before the disarming, where the land detector found the ground: at most, and at least (disarming sets it as well)."""
 _FALLS_S = 2.0
 """What is disarmed in the air falls by 20 m in this time."""
-_IDLES, _RESTS_S, _FREE_FALL = 0.05, 1.0, 9.81 / 2
+_IDLES, _RESTS_S, _FREE_FALL = 0.05, 1.0, GRAVITY / 2
 """Throttle that lifts nothing; time of it after which a fall shows, and metres in the square of that time."""
 HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
 """Where heights are told: above home, else above some other ground."""

@@ -11,6 +11,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import COMMANDS, GOALS, IMU, ODOMETRY, believable, holds, reading, tilt_of
+from care_core.geodesy import GRAVITY
 from care_core.logs.base import Table
 from care_core.numbers import median
 from care_core.text import log_time
@@ -30,7 +31,6 @@ _ASIDE = LIMITS.add(
     "probability that an acceleration in other units costs the mission", 0.05, "", "few filters fuse it"
 )
 MESSAGES_FELT = LIMITS.add("messages of an IMU", 50, "", "fewer do not tell what is usual")
-_GRAVITY_MPS2 = 9.81
 
 
 def find(drive: Drive) -> Iterator[Finding]:
@@ -53,14 +53,14 @@ def _in_g(drive: Drive) -> Iterator[Finding]:
         if not np.isfinite(axes).any(axis=1).all():
             continue
         size = float(np.linalg.norm([float(np.nanmean(axis)) for axis in axes]))
-        if LEAST_MPS2 <= size * _GRAVITY_MPS2 <= MOST_MPS2:
+        if LEAST_MPS2 <= size * GRAVITY <= MOST_MPS2:
             yield Finding(
                 kind="imu",
                 title="the IMU tells its acceleration in g, not in m/s^2",
                 onset_s=0.0,
                 end_s=drive.duration_s,
                 severity="info",
-                evidence=f"{topic} says {size:.2f} on average, where gravity is {_GRAVITY_MPS2:g} m/s^2",
+                evidence=f"{topic} says {size:.2f} on average, where gravity is {GRAVITY:g} m/s^2",
                 source=f"{topic}; REP 103: SI units",
                 suspect="parameter",
                 probability=0.9,

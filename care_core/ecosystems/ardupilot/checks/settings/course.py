@@ -12,9 +12,9 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.spans import during
+from care_core.geodesy import GRAVITY
 from care_core.numbers import Floats, median
 
-_G = 9.81
 _OVER_S, _LATE_S, _FEWEST, _HOLE_S = 1.0, 0.2, 30, 3.0
 """Speeds are compared over a second; a receiver tells them a fifth late."""
 
@@ -51,7 +51,7 @@ class Leans:
         if flying.sum() < _FEWEST or len(attitude) < _FEWEST:
             return None
         roll, pitch = np.radians(attitude["Roll"]), np.radians(attitude["Pitch"])
-        lean = _G * (-np.tan(pitch) + 1j * np.tan(roll) / np.cos(pitch))
+        lean = GRAVITY * (-np.tan(pitch) + 1j * np.tan(roll) / np.cos(pitch))
         gained = ((speed[step:] - speed[:-step])[flying]) / (end - begin)[flying]
         middle = 0.5 * (speed[step:] + speed[:-step])[flying]
         return cls(attitude.t, lean, (begin[flying], end[flying]), gained, middle)

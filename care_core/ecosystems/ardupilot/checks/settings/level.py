@@ -16,6 +16,7 @@ from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind
+from care_core.geodesy import GRAVITY
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import Floats, median
 from care_core.records import Record
@@ -23,7 +24,7 @@ from care_core.records import Record
 READS: Wanted = merge_needs((gravity.READS, {"ATT": ("Roll", "Pitch")}))
 
 LIMITS = Limits(gravity.LIMITS)
-_G = LIMITS.add("acceleration of what stands", 9.81, "m/s^2", "gravity, within 0.03 anywhere on the ground")
+_G = LIMITS.add("acceleration of what stands", GRAVITY, "m/s^2", "gravity, within 0.03 anywhere on the ground")
 _OFF = LIMITS.add("accelerometer off it, or off another", 0.5, "m/s^2", "two thirds of ARMING_ACCTHRESH")
 _RIGHT = LIMITS.add("accelerometer that measures it", 0.2, "m/s^2", "a choice: calibrations leave less")
 _LEANS_DEG = LIMITS.add("lean of the horizon of what stands level", 5.0, "deg", "a choice: trims are below 3 degrees")

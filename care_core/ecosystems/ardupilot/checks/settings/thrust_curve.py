@@ -18,6 +18,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during
+from care_core.geodesy import GRAVITY
 from care_core.logs.base import Wanted
 from care_core.records import Record
 
@@ -45,7 +46,7 @@ _CURVE_LOST = LIMITS.add(
     "24 of 50 training flights below 0 went well, 150 of 271 at 0.65",
 )
 _EMPTY_V, _LOW_CELL_V, _HIGHEST_V = 3.3, 3.5, 4.25
-_EDGE_S, _LEAST_G, _GRAVITY = 3.0, 2.0, 9.81
+_EDGE_S, _LEAST_G = 3.0, 2.0
 _THROTTLE = (0.05, 0.9)
 """A throttle that is at neither of its ends."""
 
@@ -86,7 +87,7 @@ def thrust_growth(flight: Flight) -> Growth | None:
     rows = accelerates.where(during(((start + _EDGE_S, end - _EDGE_S) for start, end in flight.flown), accelerates.t))
     angles = (np.radians(np.interp(rows.t, tilts.t, tilts[name])) for name in ("Roll", "Pitch"))
     upright = np.prod([np.cos(angle) for angle in angles], axis=0)
-    thrust, asked = (_GRAVITY - rows["AD"]) / upright, np.interp(rows.t, *flight.throttle)
+    thrust, asked = (GRAVITY - rows["AD"]) / upright, np.interp(rows.t, *flight.throttle)
     usable = np.isfinite(thrust) & (thrust > _LEAST_G) & (asked > _THROTTLE[0]) & (asked < _THROTTLE[1])
     if usable.sum() < _RECORDS:
         return None
