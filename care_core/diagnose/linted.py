@@ -20,7 +20,7 @@ from care_core.lint import navigation
 from care_core.lint.linting import lint
 from care_core.lint.problems import Problem, Severity
 from care_core.lint.scopes import Place, Scoped, as_file, scoped
-from care_core.metadata.navigation import known
+from care_core.metadata.navigation import COSTMAPS, known
 from care_core.records import replace
 from care_core.run import Setting
 from care_core.text import clean
@@ -48,7 +48,7 @@ _NEAR, _FAR = 0.5, 2.0
 far."""
 _OF_FILES = WEIGHTS.keys() - {"cannot-work", "contradiction", "hinders"}
 """Rules about how a file is written; the others are asked of the values as driven."""
-_NO_NODE = frozenset({"ros", "costmap", "local_costmap", "global_costmap"})
+_NO_NODE = frozenset({"ros", "costmap", *COSTMAPS})
 
 Usual = Callable[[str, Setting], bool]
 

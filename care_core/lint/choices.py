@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from care_core.errors import nearest
 from care_core.lint.problems import Entry, LintedFile, Problem, Severity
-from care_core.lint.readers import OBSTACLES, readers
+from care_core.lint.readers import readers
 from care_core.lint.scopes import Scoped
-from care_core.metadata.navigation import DISTRIBUTIONS, spanned
+from care_core.metadata.navigation import DISTRIBUTIONS, OBSTACLES, spanned
 
 _REPLACED = re.compile(r"[$<{]")
 """A text that a launch file replaces before the node reads it."""

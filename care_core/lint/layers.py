@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.lint.problems import Entry, LintedFile, Problem
-from care_core.lint.readers import INFLATIONS, MARKING, OBSTACLES, Reader, Readers
+from care_core.lint.readers import INFLATIONS, MARKING, Reader, Readers
 from care_core.lint.scopes import COSTMAP, class_of, words_of
+from care_core.metadata.navigation import OBSTACLES
 
 _RANGES = {"obstacle_max_range": 2.5, "raytrace_max_range": 3.0}
 """What a source of Nav2's obstacle layers has where nothing is written, m (obstacle_layer.cpp)."""

@@ -10,12 +10,12 @@ from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.errors import nearest
 from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.metadata import navigation
+from care_core.metadata.navigation import COSTMAPS
 
 _PARSER = "parse.c of rcl_yaml_param_parser"
 _SHORT = 6
 """A list of so many numbers, as nodes of Nav2 have them, is written out in the advice."""
 _DECIMALS = "Write each number with a decimal point."
-_COSTMAPS = ("local_costmap", "global_costmap")
 _KINDS = {bool: "true or false", int: "an integer", float: "a decimal number", str: "a string"}
 
 
@@ -87,4 +87,4 @@ def _outside(file: LintedFile) -> Iterator[Problem]:
 
 def _is_node(name: str) -> bool:
     is_known = name in navigation.owners("ros2") and navigation.node_of("ros2", name) == name
-    return name in _COSTMAPS or is_known
+    return name in COSTMAPS or is_known

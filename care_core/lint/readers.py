@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.problems import Entry
 from care_core.lint.scopes import Keys, Scoped
+from care_core.metadata.navigation import OBSTACLES
 from care_core.records import Struct, field
 
 PLANNERS = ("DWAPlannerROS", "TrajectoryPlannerROS", "TebLocalPlannerROS")
@@ -16,7 +17,6 @@ SHIM = "RotationShimController"
 """Reads its own values and hands all of them on to its primary controller."""
 CHECKERS = ("SimpleGoalChecker", "StoppedGoalChecker", "PositionGoalChecker")
 PROGRESS = ("SimpleProgressChecker", "PoseProgressChecker")
-OBSTACLES = ("ObstacleLayer", "VoxelLayer")
 MARKING = (*OBSTACLES, "RangeSensorLayer")
 """Layers that put what sensors see into a costmap."""
 INFLATIONS = ("InflationLayer", "LegacyInflationLayer", "AsymmetricInflationLayer")

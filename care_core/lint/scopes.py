@@ -10,17 +10,15 @@ from care_core.ecosystems.ros.dialect import ROS1_YAML, ROS2_YAML
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.problems import Entry, LintedFile
 from care_core.metadata import navigation
-from care_core.metadata.navigation import Ros
+from care_core.metadata.navigation import COSTMAPS, OBSTACLES, Ros
 from care_core.records import Struct, field
 from care_core.run import Setting
 
 Keys = tuple[str, ...]
 
 COSTMAP = "costmap"
-_COSTMAPS = ("local_costmap", "global_costmap")
 _LAYERS_BY_NAME = {
-    "static_layer": ("StaticLayer",), "inflation_layer": ("InflationLayer",),
-    "obstacle_layer": ("ObstacleLayer", "VoxelLayer"),
+    "static_layer": ("StaticLayer",), "inflation_layer": ("InflationLayer",), "obstacle_layer": OBSTACLES,
 }  # fmt: skip
 """Names that the costmap itself gives layers (costmap_2d_ros.cpp, loadOldParameters)."""
 _CLASS = re.compile(r"[A-Z]\w*(?:ROS|Planner|Controller)")
@@ -128,7 +126,7 @@ def _ros2(file: LintedFile) -> Scoped:
             continue
         at = keys.index(PARAMETERS)
         node = keys[at - 1]
-        owner = COSTMAP if node in _COSTMAPS else node if node in navigation.owners("ros2") else ""
+        owner = COSTMAP if node in COSTMAPS else node if node in navigation.owners("ros2") else ""
         if owner == COSTMAP and not _is_costmap(file, keys[:at]):
             result.misnested.setdefault(keys[:at], entry)
             owner = ""
@@ -249,7 +247,7 @@ def _reader(
 ) -> Keys:
     """Who reads a namespace: by its name, by the list that loads it, or by what is in it."""
     name = keys[-1] if keys else file.namespace.strip("/").rpartition("/")[2]
-    if name in _COSTMAPS:
+    if name in COSTMAPS:
         return (COSTMAP,)
     if name in navigation.owners("ros1"):
         return (name,)
@@ -264,7 +262,7 @@ def _reader(
     if not keys and keys in plugins:
         return (COSTMAP,)
     below = {key[len(keys)] for key in parts if len(key) > len(keys) and key[: len(keys)] == keys}
-    if not keys and below & {"DWAPlannerROS", "TrajectoryPlannerROS", "TebLocalPlannerROS", *_COSTMAPS}:
+    if not keys and below & {"DWAPlannerROS", "TrajectoryPlannerROS", "TebLocalPlannerROS", *COSTMAPS}:
         return _of_part([entry.keys[-1] for entry in parts.get(keys, ())]) or ("move_base",)
     return _by_names([entry.keys[-1] for entry in parts.get(keys, ())], is_inside=bool(keys))
 

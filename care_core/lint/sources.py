@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.lint.problems import LintedFile, Problem
-from care_core.lint.readers import OBSTACLES, Reader, Readers, readers
+from care_core.lint.readers import Reader, Readers, readers
 from care_core.lint.scopes import Scoped, words_of
-from care_core.metadata.navigation import spanned
+from care_core.metadata.navigation import OBSTACLES, spanned
 
 _BUFFER = "observation_buffer.cpp keeps the points between min_obstacle_height and max_obstacle_height of the source"
 _PRIVATE = spanned("foxy-jazzy", "ros2")

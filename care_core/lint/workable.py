@@ -16,7 +16,6 @@ from care_core.lint.readers import (
     COLLISIONS,
     CONTROLLERS,
     INFLATIONS,
-    OBSTACLES,
     PLANNERS,
     PROGRESS,
     SAMPLED,
@@ -26,6 +25,7 @@ from care_core.lint.readers import (
     readers,
 )
 from care_core.lint.scopes import COSTMAP, Scoped, words_of
+from care_core.metadata.navigation import OBSTACLES
 
 _SAME_S = 1e-6
 """Periods that are so near count as one (optimizer.cpp)."""

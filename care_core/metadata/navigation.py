@@ -25,6 +25,9 @@ STACKS: Mapping[Ros, str] = {
     "ros1": "the sources of ros-planning/navigation and teb_local_planner, indigo to noetic",
     "ros2": "the sources of ros-navigation/navigation2, foxy to rolling",
 }
+COSTMAPS = ("local_costmap", "global_costmap")
+OBSTACLES = ("ObstacleLayer", "VoxelLayer")
+"""Classes of the layers that put obstacles into a costmap; both read the same parameters."""
 
 
 class Mended(Record):

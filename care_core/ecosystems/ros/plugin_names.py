@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from care_core.ecosystems.ros.node_messages import LogMessage
+from care_core.metadata.navigation import OBSTACLES
 from care_core.run import Setting, Settings
 
 _LISTS = {
@@ -15,8 +16,7 @@ _LISTS = {
     "progress_checker": "progress_checker_plugins",
 }
 """Usual name of a plugin, and the list of its server that holds the names which a robot has for such."""
-_OBSTACLES = ("ObstacleLayer", "VoxelLayer")
-_LAYERS = {"obstacle_layer": _OBSTACLES, "voxel_layer": _OBSTACLES, "inflation_layer": ("InflationLayer",)}
+_LAYERS = {"obstacle_layer": OBSTACLES, "voxel_layer": OBSTACLES, "inflation_layer": ("InflationLayer",)}
 """Usual name of a costmap's layer, and the classes that read the same parameters."""
 _SOURCE = "scan"
 """Usual name of what a layer gets its obstacles from."""
