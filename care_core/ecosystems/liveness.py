@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from care_core.ecosystems.base import Limits
 from care_core.ecosystems.coverage import unseen, usual_pause
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
+from care_core.ecosystems.lithium import HARMED_V, NO_CELL_V
 from care_core.ecosystems.spans import Span, seconds_in, unbroken
 from care_core.numbers import Floats, ascending, distinct, quantile
 from care_core.records import Record
@@ -40,8 +41,12 @@ WATCHED = LIMITS.add(
 UNPOWERED_V = LIMITS.add(
     "most volts of a monitor without a pack", 2.5, "V", "a choice: 1 empty cell; loose inputs say 0.1 V"
 )
-_ONE_CELL_V = LIMITS.add("one full cell", 4.4, "V", "voltages of lithium polymer cells, high voltage ones as well")
-_TWO_CELLS_V = LIMITS.add("two cells that lift a vehicle", 6.0, "V", "voltages of lithium polymer cells: 3 V ruin one")
+_ONE_CELL_V = LIMITS.add(
+    "one full cell", NO_CELL_V, "V", "voltages of lithium polymer cells, high voltage ones as well"
+)
+_TWO_CELLS_V = LIMITS.add(
+    "two cells that lift a vehicle", 2 * HARMED_V, "V", "voltages of lithium polymer cells: 3 V ruin one"
+)
 _TWO_LOW_V = LIMITS.add("two cells that are nearly empty", 6.8, "V", "voltages of lithium polymer cells")
 PROBABILITY = LIMITS.add("probability of a dead source", 0.9, "", "a choice: nothing else repeats to the last bit")
 

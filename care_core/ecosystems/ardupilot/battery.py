@@ -8,19 +8,14 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.statistics import smooth
+from care_core.ecosystems.lithium import FULL_V, HARMED_V, HIGHEST_V, LOW_V, RUNS_V
 from care_core.ecosystems.spans import during
 from care_core.logs.base import Table
 from care_core.numbers import median, quantile
 from care_core.records import Record
 
-FULL_V = 4.2
-"""A full cell of a lithium polymer pack."""
-_LOW_V, _HIGHEST_V = 3.5, 4.25
-"""A cell at rest, worth flying on, to fully charged."""
-_LEAST_FULL_V = 3.0
-"""A pack whose best moment is below this a cell has fewer cells than the parameter says."""
 _PACKS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14)
-_ALIVE_V, _MOST_V = 4.0, 120.0
+_MOST_V = 120.0
 _STEADY_S = 2.0
 """Over so long a voltage is that of the pack, and no longer the noise of a monitor, which may be a cell's."""
 _FULL_PACK = ("MOT_BAT_VOLT_MAX", "MOT_V_MAX", "Q_M_BAT_VOLT_MAX")
@@ -52,9 +47,10 @@ class Battery(Record, eq=False):
         start_s, start_v = _start(flight, table)
         full = flight.setting(*_FULL_PACK) if number == 1 else None
         highest = quantile(smooth(alive.t, alive["Volt"], _STEADY_S), 0.99) if len(alive) else 0.0
-        fewest = max(math.ceil((highest - 0.3) / (FULL_V + 0.05)), 1)
+        fewest = max(math.ceil((highest - 0.3) / HIGHEST_V), 1)
         by_parameter = round(full / FULL_V) if full else 0
-        is_by_parameter = by_parameter >= fewest and highest / max(by_parameter, 1) >= _LEAST_FULL_V
+        # A pack whose best moment is below what harms its cells has fewer than the parameter says.
+        is_by_parameter = by_parameter >= fewest and highest / max(by_parameter, 1) >= HARMED_V
         cells = by_parameter if is_by_parameter else fewest
         known = is_by_parameter or _possible(start_v) == [cells]
         return cls(number, table, start_s, start_v, _at_rest(flight, alive), cells, known)
@@ -66,12 +62,12 @@ class Battery(Record, eq=False):
 
 def within_reason(table: Table) -> Table:
     """The rows of BAT with a voltage that a vehicle could run on."""
-    return table.where((table["Volt"] > _ALIVE_V) & (table["Volt"] < _MOST_V))
+    return table.where((table["Volt"] > RUNS_V) & (table["Volt"] < _MOST_V))
 
 
 def _possible(volts: float) -> list[int]:
     """The numbers of cells that a pack of such a voltage at rest may have."""
-    return [count for count in _PACKS if _LOW_V <= volts / count <= _HIGHEST_V]
+    return [count for count in _PACKS if LOW_V <= volts / count <= HIGHEST_V]
 
 
 def _start(flight: Armed, table: Table) -> tuple[float, float]:

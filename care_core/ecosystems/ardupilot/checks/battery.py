@@ -18,6 +18,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import BATTERY_FAILSAFE, NO_BATTERY, OWN_SUPPLY, SAGS, UNCHARGED, Finding, Severity
+from care_core.ecosystems.lithium import CHARGED_V, CRITICAL_V, FULL_V, HARMED_V, LOW_V, NOT_FULL_V
 from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, known_median, median
@@ -28,11 +29,11 @@ READS: Wanted = {"BAT": ("Volt", "Curr"), "POWR": ("Vcc",)}
 LIMITS = Limits()
 _CELLS = "voltages of lithium polymer cells"
 _ADVICE = "ArduPilot, Battery Failsafe"
-NOT_FULL = LIMITS.add("cell at rest, charged", 3.9, "V", _CELLS)
-FULL = LIMITS.add("cell at rest, full", 4.1, "V", _CELLS)
-LOW = LIMITS.add("usual low level of a cell", 3.5, "V", _ADVICE)
-CRITICAL = LIMITS.add("critical level of a cell", 3.3, "V", _ADVICE)
-RUINOUS = LIMITS.add("level that harms a cell", 3.0, "V", _CELLS)
+NOT_FULL = LIMITS.add("cell at rest, charged", NOT_FULL_V, "V", _CELLS)
+FULL = LIMITS.add("cell at rest, full", CHARGED_V, "V", _CELLS)
+LOW = LIMITS.add("usual low level of a cell", LOW_V, "V", _ADVICE)
+CRITICAL = LIMITS.add("critical level of a cell", CRITICAL_V, "V", _ADVICE)
+RUINOUS = LIMITS.add("level that harms a cell", HARMED_V, "V", _CELLS)
 _LASTS_S = LIMITS.add("shortest sag", 2.0, "s", "a choice: a burst of throttle is over sooner")
 _EARLY_V = LIMITS.add("failsafe above the usual low level by", 0.05, "V", "a choice: voltages are set to a tenth")
 _DRAWS_A = LIMITS.add("current that is drawn", 0.5, "A", "a choice: monitors are off by less")
@@ -98,7 +99,7 @@ def _not_charged(flight: Flight, rest: float, cells: int, lowest: float | None) 
         severity=severity,
         evidence=(
             f"{rest:.1f} V at rest before take-off, {rest / cells:.2f} V for each of {cells} cells "
-            f"(full 4.2, limit {NOT_FULL})"
+            f"(full {FULL_V}, limit {NOT_FULL})"
             + _flown_down(flight, rest, cells)
             + ("" if lowest is None else f"; down to {_under_load(lowest, cells)}")
             + _and_failsafe(failsafe)
@@ -135,7 +136,7 @@ def _sags(flight: Flight, table: Table, low: list[Span], lowest: float, cells: i
             + ("; a charged pack does not sag so soon: it is worn or too small" if is_weak else "")
             + _and_failsafe(failsafe)
         ),
-        source="BAT.Volt; 3.3 V a cell: ArduPilot, Battery Failsafe",
+        source=f"BAT.Volt; {CRITICAL} V a cell: {_ADVICE}",
         probability=_WEAK if is_weak else _DEEP if is_deep else _SAGS,
     )
 
@@ -145,7 +146,7 @@ def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: f
     limit = flight.setting(*supply.LOW_VOLT) or 0.0
     is_early = limit / cells > LOW + _EARLY_V
     is_full = rest is None or rest / cells >= FULL
-    asks = f"; BATT_LOW_VOLT={limit:g} asks for it at {limit / cells:.2f} V a cell, 3.5 is usual" if is_early else ""
+    asks = f"; BATT_LOW_VOLT={limit:g} asks for it at {limit / cells:.2f} V a cell, {LOW} is usual" if is_early else ""
     asks += "" if rest is None or is_full else f"; not full before take-off: {rest / cells:.2f} V a cell"
     return Finding(
         kind="battery",

@@ -12,6 +12,7 @@ from care_core.ecosystems.ardupilot.checks.settings.supply import wrong_scale
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.texts import Refusal
 from care_core.ecosystems.base import Limits
+from care_core.ecosystems.lithium import CHARGED_V, HARMED_V
 from care_core.ecosystems.way_back import way_back
 from care_core.metadata.ardupilot import firmware_default
 from care_core.metadata.causal_map import SET_BY_HAND, Role, meaning_of
@@ -41,8 +42,8 @@ _FAR = LIMITS.add(
     "far off its default", 1.5, "times", "a choice: what is tuned is seldom off by more and fails a check"
 )
 _CODES = LIMITS.add("greatest default of a code", 10.0, "", "a choice: another code is another choice, however near")
-_FULL_AT = LIMITS.add("cell that reads full", 4.1, "V", "voltages of lithium polymer cells")
-_NONE_AT = LIMITS.add("cell that no pack has", 3.0, "V", "voltages of lithium polymer cells")
+_FULL_AT = LIMITS.add("cell that reads full", CHARGED_V, "V", "voltages of lithium polymer cells")
+_NONE_AT = LIMITS.add("cell that no pack has", HARMED_V, "V", "voltages of lithium polymer cells")
 _SAME = 1e-6
 """Vehicles hold parameters in 32 bits."""
 

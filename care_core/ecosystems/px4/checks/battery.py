@@ -9,6 +9,7 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import UNCHARGED, Finding
+from care_core.ecosystems.lithium import HARMED_V, HIGHEST_V, LOW_V
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles.settings import code
@@ -30,12 +31,12 @@ _EMPTY = LIMITS.add("probability that it was not charged", 0.9, "", "training fl
 _WORN = LIMITS.add("probability that it is worn", 0.85, "", "training flights: 3 of 3, and none of 460 without")
 _LOSES = LIMITS.add("probability that a mission fails with either", 0.9, "", "training flights: 9 of 9")
 _RAN_S = LIMITS.add("time in the air at its emergency level", 1.0, "s", "a choice: a gust draws it down for less")
-_DEEP_V = LIMITS.add("voltage of a cell in the air that is emptied", 3.0, "V", "lithium cells are damaged below")
+_DEEP_V = LIMITS.add("voltage of a cell in the air that is emptied", HARMED_V, "V", "lithium cells are damaged below")
 _RAN = LIMITS.add("probability that it ran down", 0.9, "", "the firmware's own word")
 _RAN_LOSES = LIMITS.add("probability that a mission fails as it runs down", 0.7, "", "a choice: it may have come home")
 _SHORT_V = LIMITS.add("voltage of a cell at rest that is none", 3.1, "V", "nobody takes off with cells as dead as that")
-_PER_CELL = (LIMITS.add("least voltage of a cell that is", 3.5, "V", "an empty lithium cell at rest"),
-             LIMITS.add("most voltage of a cell that is", 4.25, "V", "a full one: 4.2"))  # fmt: skip
+_PER_CELL = (LIMITS.add("least voltage of a cell that is", LOW_V, "V", "an empty lithium cell at rest"),
+             LIMITS.add("most voltage of a cell that is", HIGHEST_V, "V", "a full one: 4.2"))  # fmt: skip
 _CELLS = LIMITS.add("probability of a wrong number of cells", 0.7, "", "a choice: they may all be dead")
 _CELLS_LOSE = LIMITS.add("probability that it loses a mission", 0.05, "", "a choice: failsafes act too soon or late")
 _BEGINS_S = LIMITS.add("time in which a log that begins armed tells of rest", 5.0, "s", "a choice: before it lifts")

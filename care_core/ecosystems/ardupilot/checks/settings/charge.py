@@ -17,6 +17,7 @@ from care_core.ecosystems.ardupilot.battery import Battery
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.lithium import CHARGED_V, charge_left
 from care_core.ecosystems.spans import during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median
@@ -25,7 +26,7 @@ from care_core.run import shown
 READS: Wanted = {"BAT": ("Volt", "Curr")}
 
 LIMITS = Limits()
-_FULL = LIMITS.add("cell of a pack that was charged", 4.1, "V", "cells of lithium polymer packs")
+_FULL = LIMITS.add("cell of a pack that was charged", CHARGED_V, "V", "cells of lithium polymer packs")
 _USED = LIMITS.add("share of the charge used, by its voltage", 0.2, "", "a choice: of less the voltage tells little")
 _FLOWN = "99 of 100 flights at the right scale have 0.61 to 0.94"
 _LEAST = LIMITS.add("charge that was measured, times that share, at least", 0.5, "", _FLOWN)
@@ -41,9 +42,6 @@ _LIKELY = LIMITS.add(
     "probability of a wrong scale of the current", 0.8, "", "a choice: BATT_CAPACITY may be wrong instead"
 )
 _LOST = LIMITS.add("probability that it costs the mission", 0.05, "", "0 of 2 flights at half and twice failed")
-_LEFT_V = (3.3, 3.6, 3.7, 3.75, 3.8, 3.85, 3.9, 4.0, 4.1, 4.2)
-_LEFT = (0.0, 0.05, 0.13, 0.25, 0.4, 0.55, 0.63, 0.78, 0.89, 1.0)
-"""Volts of a lithium polymer cell at rest, and the share of its charge that it then holds."""
 _AS_PER_MAH = 3.6
 
 
@@ -108,7 +106,7 @@ def _used_by_voltage(flight: Flight, battery: Battery) -> tuple[float, float] | 
     if battery.rest_v is None or battery.rest_v / battery.cells < _FULL or len(landed) < _LANDED:
         return None
     row = int(np.argmax(landed["Volt"]))
-    used = 1.0 - float(np.interp(float(landed["Volt"][row]) / battery.cells, _LEFT_V, _LEFT))
+    used = 1.0 - charge_left(float(landed["Volt"][row]) / battery.cells)
     return (float(landed.t[row]), used) if used >= _USED else None
 
 

@@ -13,10 +13,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.battery import FULL_V, Battery
+from care_core.ecosystems.ardupilot.battery import Battery
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import BATTERY_FAILSAFE, Finding
+from care_core.ecosystems.lithium import CHARGED_V, CRITICAL_V, FULL_V, HIGHEST_V, LOW_V, NO_CELL_V, NOT_FULL_V, RUNS_V
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median
 from care_core.records import Record
@@ -27,30 +28,28 @@ READS: Wanted = {"BAT": ("Volt", "Curr")}
 
 LIMITS = Limits()
 _LOW_CELL = "cells of lithium polymer packs"
-_NOT_FULL = LIMITS.add("cell at rest that a pack may have and not be full", 3.9, "V", _LOW_CELL)
-_FULL = LIMITS.add("cell of a pack that was charged", 4.1, "V", _LOW_CELL)
-_MOST = LIMITS.add("highest cell", 4.25, "V", _LOW_CELL)
-_NO_CELL = LIMITS.add("cell that no pack has", 4.4, "V", "lithium polymer cells of high voltage: 4.35 V")
+_NOT_FULL = LIMITS.add("cell at rest that a pack may have and not be full", NOT_FULL_V, "V", _LOW_CELL)
+_FULL = LIMITS.add("cell of a pack that was charged", CHARGED_V, "V", _LOW_CELL)
+_MOST = LIMITS.add("highest cell", HIGHEST_V, "V", _LOW_CELL)
+_NO_CELL = LIMITS.add("cell that no pack has", NO_CELL_V, "V", "lithium polymer cells of high voltage: 4.35 V")
 _NO_PACK = LIMITS.add("cell at rest that no vehicle flies on", 2.5, "V", "lithium polymer cells are ruined below 3 V")
-_RUNS_V = LIMITS.add("voltage that a vehicle runs on", 4.0, "V", "one full cell")
 _AT_REST_A = LIMITS.add("current before arming", 3.0, "A", "a choice: boards, radios and cameras draw less")
 _NONE_A = LIMITS.add("current before arming that is none", 1.0, "A", "a choice")
 _ADVISED = {
     "low": LIMITS.add("usual low level of a cell", 3.55, "V", "ArduPilot, Battery Failsafe: 3.5 V, set to a tenth"),
     "critical": LIMITS.add("usual critical level of a cell", 3.4, "V", "ArduPilot, Battery Failsafe: 3.3 V"),
 }
-_LEFT = LIMITS.add("cell under load that holds much charge", 3.5, "V", "ArduPilot, Battery Failsafe: low at 3.5 V")
+_LEFT = LIMITS.add("cell under load that holds much charge", LOW_V, "V", "ArduPilot, Battery Failsafe: low at 3.5 V")
 _MOST_USED = LIMITS.add("share of the capacity used by then", 0.6, "", "a choice: a fifth is a usual reserve")
 _SLACK = LIMITS.add("charge that a threshold is met by", 0.03, "", "a choice: records are rounded")
 _SURE = LIMITS.add("probability of a wrong scale", 0.95, "", "no pack reads so, and one at the default scale does")
 _ACTED = LIMITS.add(
     "probability of the threshold that acted", 0.9, "", "the firmware's own word, and a pack that was well"
 )
-_CELL_LOW_V = 3.5
 LOW_VOLT = ("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT")
 """What the voltage of the low level was called."""
-DRIVES_V = LIMITS.add("voltage that drives a vehicle", 4.0, "V", "one full cell")
-_USUAL = {"low": 3.5, "critical": 3.3}
+DRIVES_V = LIMITS.add("voltage that drives a vehicle", RUNS_V, "V", "one full cell")
+_USUAL = {"low": LOW_V, "critical": CRITICAL_V}
 _SAID_WITHIN_S = 1.0
 _BY_VOLTAGE, _BY_CHARGE = ("BATT_LOW_VOLT", "BATT_CRT_VOLT"), ("BATT_LOW_MAH", "BATT_CRT_MAH")
 """The thresholds of the failsafe that rest on a measured voltage, and on a measured current."""
@@ -171,7 +170,7 @@ def not_measured(flight: Flight) -> Finding | None:
 
 def _says(table: Table, field: str) -> bool:
     values = table[field] if field in table.columns else np.empty(0)
-    return bool(np.isfinite(values).any()) and (field != "Volt" or bool(np.nanmax(values) > _RUNS_V))
+    return bool(np.isfinite(values).any()) and (field != "Volt" or bool(np.nanmax(values) > DRIVES_V))
 
 
 def wrong_current(flight: Flight) -> Finding | None:
@@ -276,7 +275,7 @@ def _cells(flight: Flight) -> int | None:
     """How many cells the parameters say that the pack has; None where they say nothing, or two things."""
     full = flight.setting("MOT_BAT_VOLT_MAX", "Q_M_BAT_VOLT_MAX")
     low = flight.setting(*LOW_VOLT)
-    said = {round(volts / cell) for volts, cell in ((full, FULL_V), (low, _CELL_LOW_V)) if volts}
+    said = {round(volts / cell) for volts, cell in ((full, FULL_V), (low, LOW_V)) if volts}
     return said.pop() if len(said) == 1 else None
 
 

@@ -13,10 +13,11 @@ from functools import partial
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.battery import FULL_V, Battery
+from care_core.ecosystems.ardupilot.battery import Battery
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.lithium import CHARGED_V, CRITICAL_V, FULL_V, HIGHEST_V, LOW_V
 from care_core.ecosystems.spans import during
 from care_core.geodesy import GRAVITY
 from care_core.logs.base import Wanted
@@ -33,7 +34,7 @@ _AGREE = LIMITS.add("least correlation of thrust and throttle", 0.8, "", "a choi
 _VARIES = LIMITS.add("least relative change of the throttle", 0.015, "", "a choice: less is no climb or descent")
 _RECORDS = LIMITS.add("fewest records of thrust", 60.0, "", "a choice: half a minute of a thinned log")
 _EXPO, _FULL, _EMPTY = "MOT_THST_EXPO", "MOT_BAT_VOLT_MAX", "MOT_BAT_VOLT_MIN"
-_PACK = LIMITS.add("cell of a pack that was charged", 4.1, "V", "cells of lithium polymer packs")
+_PACK = LIMITS.add("cell of a pack that was charged", CHARGED_V, "V", "cells of lithium polymer packs")
 _FULL_LEAST = LIMITS.add(f"full cell that {_FULL} may mean, least", 3.9, "V", "lithium ion: 4.1 V, iron: less")
 _FULL_MOST = LIMITS.add(f"full cell that {_FULL} may mean, most", 4.5, "V", "cells of high voltage: 4.35 V")
 _EMPTY_MOST = LIMITS.add(f"empty cell that {_EMPTY} may mean, most", 3.8, "V", "ArduPilot: 3.3 V; 3.5 V is used")
@@ -45,7 +46,6 @@ _CURVE_LOST = LIMITS.add(
     "",
     "24 of 50 training flights below 0 went well, 150 of 271 at 0.65",
 )
-_EMPTY_V, _LOW_CELL_V, _HIGHEST_V = 3.3, 3.5, 4.25
 _EDGE_S, _LEAST_G = 3.0, 2.0
 _THROTTLE = (0.05, 0.9)
 """A throttle that is at neither of its ends."""
@@ -115,7 +115,7 @@ def _another_pack(flight: Flight) -> Iterator[Finding]:
     elif flight.default_left(_EMPTY) is not None and empty and empty / cells > _EMPTY_MOST:
         lost = "the thrust is not scaled" if empty >= full else "the thrust is hardly scaled as the pack drains"
         evidence = f"{pack}, and {_EMPTY}={empty:g} is {empty / cells:.2f} V a cell (limit {_EMPTY_MOST:g}): {lost}"
-        yield told(_EMPTY, round(_EMPTY_V * cells, 1), f"{_EMPTY} is of another pack", evidence)
+        yield told(_EMPTY, round(CRITICAL_V * cells, 1), f"{_EMPTY} is of another pack", evidence)
 
 
 def _cells(flight: Flight, battery: Battery) -> int | None:
@@ -124,10 +124,10 @@ def _cells(flight: Flight, battery: Battery) -> int | None:
     low, rest = flight.setting("BATT_LOW_VOLT"), battery.rest_v
     if rest is None:
         return None
-    charged = [count for count in range(1, 15) if _PACK <= rest / count <= _HIGHEST_V]
-    possible = [count for count in range(1, 15) if _LOW_CELL_V <= rest / count <= _HIGHEST_V]
-    if low and round(low / _LOW_CELL_V) in charged:
-        return round(low / _LOW_CELL_V)
+    charged = [count for count in range(1, 15) if _PACK <= rest / count <= HIGHEST_V]
+    possible = [count for count in range(1, 15) if LOW_V <= rest / count <= HIGHEST_V]
+    if low and round(low / LOW_V) in charged:
+        return round(low / LOW_V)
     return charged[0] if not low and possible == charged and len(charged) == 1 else None
 
 
