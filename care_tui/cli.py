@@ -182,12 +182,12 @@ def command_line(words: Sequence[str] | None = None) -> typer.Typer:
         help=HELP,
     )
     app.callback()(_care)
-    for family in FAMILIES if words is None else _asked(words):
+    for family in FAMILIES if words is None else _families_named(words):
         app.add_typer(import_module(f"care_tui.commands.{family}").app)
     return app
 
 
-def _asked(words: Sequence[str]) -> Iterable[str]:
+def _families_named(words: Sequence[str]) -> Iterable[str]:
     """The family of the command that is named or, for a log or nothing, of the app's; else all."""
     first = words[0] if words else ""
     named = [family for family, commands in FAMILIES.items() if first in commands and first != OPEN]

@@ -86,7 +86,9 @@ def triage_all(sources: Sequence[Source], asked: Request, cluster: Cluster, prog
                 row = unreadable(source.name, answer.reason) if isinstance(answer, Failed) else answer
                 rows[place] = row
                 unread += row.status == "unreadable"
-                progress(_said(len(rows), unread, len(sources), time.monotonic() - began), len(rows) / len(sources))
+                progress(
+                    _progress_line(len(rows), unread, len(sources), time.monotonic() - began), len(rows) / len(sources)
+                )
     return tuple(rows[place] for place in range(len(sources)))
 
 
@@ -110,7 +112,7 @@ def _world(case: Case) -> CounterfactualQuery | None:
     return query_of(reading.judged, reading.profile)
 
 
-def _said(done: int, unread: int, count: int, took_s: float) -> str:
+def _progress_line(done: int, unread: int, count: int, took_s: float) -> str:
     rate = done / max(took_s, 1e-3)
     told = f"triaged {done} of {count} logs, {unread} unreadable, {rate:.2g} a second"
     if done < _PACE_LOGS:

@@ -47,7 +47,7 @@ def record(found: ToRecord, out: Path, say: Say) -> int:
         raise UsageError("There is no 'ros2' here.", hint=hint) from err
     if out.exists():
         raise UsageError("There is something of that name.", hint="Name a new folder with --out.", where=str(out))
-    words = recorder_words(found, out, is_humble="--topics" not in _asked(ros2, "bag", "record", "--help"))
+    words = recorder_words(found, out, is_humble="--topics" not in _output_of(ros2, "bag", "record", "--help"))
     # Ctrl+C goes to this process alone, which tells the recorder once: told twice it would leave its index unwritten.
     recorder = subprocess.Popen([ros2, *words[1:]], stdin=subprocess.DEVNULL, stdout=sys.stderr, start_new_session=True)
     asked: dict[str, str] = {}
@@ -76,14 +76,14 @@ def _keep_parameters(ros2: str, asked: dict[str, str], out: Path, recorder: subp
 
 def _parameters(ros2: str, known: dict[str, str]) -> dict[str, str]:
     """What each node that is not known yet says of its parameters, by node."""
-    nodes = [line.strip() for line in _asked(ros2, "node", "list").splitlines() if line.startswith("/")]
+    nodes = [line.strip() for line in _output_of(ros2, "node", "list").splitlines() if line.startswith("/")]
     new = [node for node in dict.fromkeys(nodes) if node not in known]
     with ThreadPoolExecutor(_AT_ONCE) as pool:
-        texts = pool.map(lambda node: _asked(ros2, "param", "dump", node), new)
+        texts = pool.map(lambda node: _output_of(ros2, "param", "dump", node), new)
         return {node: text for node, text in zip(new, texts, strict=True) if "ros__parameters" in text}
 
 
-def _asked(*words: str) -> str:
+def _output_of(*words: str) -> str:
     """What a command prints, nothing where it fails or does not end."""
     try:
         done = subprocess.run(

@@ -143,7 +143,7 @@ def signals_of(case: OpenRun) -> list[Signal]:
     log = log_of(case)
     present = {channel.name: channel for channel in log.channels() if channel.count}
     users = _read_by_profile(case, present)
-    held = _held(log, present, users)
+    held = _recorded_fields(log, present, users)
     known = {(one.channel, one.field): one for one in _known(present, held)}
     found = [replace(known.get(source, Signal(*source)), used_by=names) for source, names in users.items()]
     every = [
@@ -176,7 +176,7 @@ def _read_by_profile(case: OpenRun, present: Collection[str]) -> dict[Source, tu
     return {source: tuple(sorted(users[source], key=lambda name: name not in matters)) for source in ranked}
 
 
-def _held(log: Log, present: Mapping[str, Channel], read: Iterable[Source]) -> set[Source]:
+def _recorded_fields(log: Log, present: Mapping[str, Channel], read: Iterable[Source]) -> set[Source]:
     """Which of the fields that are known or read the log really has. A ROS message has the fields of its type."""
     asked: dict[str, set[str]] = {}
     for name in present:

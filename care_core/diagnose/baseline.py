@@ -117,7 +117,7 @@ def missions(runs: Sequence[Judged], schema: Schema) -> int:
     different: list[Threshold] = []
     for judged in runs:
         if all(mission.mismatch(judged.run.context) for mission in different):
-            different.append(Threshold("<=", source="", mission=_asked(judged, schema)))
+            different.append(Threshold("<=", source="", mission=_mission_context(judged, schema)))
     return len(different)
 
 
@@ -128,7 +128,7 @@ def differing(runs: Sequence[Judged]) -> tuple[str, ...]:
     return tuple(sorted(n for n in names if any(not same_value(first[n], j.run.config[n]) for j in runs)))
 
 
-def _asked(judged: Judged, schema: Schema) -> dict[str, float]:
+def _mission_context(judged: Judged, schema: Schema) -> dict[str, float]:
     context = judged.run.context
     return {v.name: round(context[v.name], 2) for v in schema.asked if is_known(context.get(v.name))}  # type: ignore[arg-type]
 
@@ -147,7 +147,7 @@ def _proposal(objective: Variable, runs: Sequence[Judged], profile: Profile) -> 
         few = f"{len(values)} run{'s' if len(values) > 1 else ''}"
         return _without(nothing, f"{few} cannot tell how much runs differ, {FEW} can")
     limit = _rounded(found.high if nothing.op in ("<=", "<") else found.low, up=nothing.op in ("<=", "<"))
-    mission = None if relative else _asked(runs[0], profile.schema)
+    mission = None if relative else _mission_context(runs[0], profile.schema)
     return Proposal(objective, relative, nothing.seen, limit, found.low, found.high, found.method, mission=mission)
 
 

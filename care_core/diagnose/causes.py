@@ -154,10 +154,10 @@ def _cause_notes(failed: FailedRun, suspect: Suspect, in_support: bool, support:
         notes.append(Note("pinned by --keep: not changed"))
     notes += map(Note, change_notes(failed.profile.schema.variables[suspect.option]))
     speaking = (evidence for evidence in failed.run.evidence if suspect.option in evidence.options)
-    return (*notes, *_said(gathered(speaking)))
+    return (*notes, *_notes_of(gathered(speaking)))
 
 
-def _said(evidence: Iterable[Evidence]) -> Iterator[Note]:
+def _notes_of(evidence: Iterable[Evidence]) -> Iterator[Note]:
     """What this run says of an option; what it means once, however many messages mean it."""
     told: set[str] = set()
     for one in evidence:

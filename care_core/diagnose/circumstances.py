@@ -30,7 +30,7 @@ RARE = 0.025
 
 def circumstances(run: Run, query: CounterfactualQuery, schema: Schema) -> tuple[Circumstance, ...]:
     """What this run met and no option set, the rarest first."""
-    found = [*_shown(run, query, schema), *_said(run), *_unsupported(run, query, schema)]
+    found = [*_shown(run, query, schema), *_of_messages(run), *_unsupported(run, query, schema)]
     named: dict[tuple[str, str], Circumstance] = {}
     for one in sorted(found, key=lambda one: one.share):
         named.setdefault((one.name, one.variable), one)
@@ -124,7 +124,7 @@ def _metric(name: str, variable: Variable, side: Side, value: float, query: Coun
     return Circumstance(name, variable.name, value, variable.unit, low, high, share, text)
 
 
-def _said(run: Run) -> Iterator[Circumstance]:
+def _of_messages(run: Run) -> Iterator[Circumstance]:
     """What a message of the log speaks of, unless it points at an option whose value sets it off."""
     for evidence in run.evidence:
         if evidence.circumstance is not None and not evidence.options:

@@ -176,7 +176,7 @@ def row_of(log: str, diagnosis: Diagnosis, query: CounterfactualQuery | None = N
         change={} if diagnosis.fix is None else {one.option.name: one.suggested for one in diagnosis.fix.changes},
         p_fixed=None if diagnosis.fix is None else diagnosis.fix.odds,
         off={} if query is None else {name: query.reference[name] for name in deviating(query.config, query.reference)},
-        asked=None if query is None else _asked(query, diagnosis.failure),
+        asked=None if query is None else _query_of(query, diagnosis.failure),
     )
 
 
@@ -206,7 +206,7 @@ def by_folder(row: Row) -> Row:
     return row if row.robot or not row.folder else replace(row, robot=row.folder, called=row.folder)
 
 
-def _asked(query: CounterfactualQuery, failure: NoisyOr | None) -> Asked:
+def _query_of(query: CounterfactualQuery, failure: NoisyOr | None) -> Asked:
     """Only what the model reads of the run."""
     stages = {stage.variable for outcome in query.model.outcomes.values() for stage in outcome.stages}
     known = {name: known_value(query.observed, name) for name in (*query.model.outcomes, *sorted(stages))}

@@ -116,15 +116,15 @@ def _patterns(sort: str, rows: Sequence[Row]) -> Iterator[Pattern]:
         # Only runs that the same profile judged can have it.
         profiles = {row.profile for row in rows if _is_cause(row, "parameter", option)}
         same = [row for row in rows if row.profile in profiles and row.is_judged]
-        yield from _told(_pattern("cause", "parameter", option, sort, same, _causes("parameter", option)), told)
+        yield from _new_pattern(_pattern("cause", "parameter", option, sort, same, _causes("parameter", option)), told)
     for what, kind in dict.fromkeys((one.what, one.kind or one.name) for row in rows if (one := row.main)):
         if what != "parameter":
-            yield from _told(_pattern("cause", what, kind, sort, rows, _causes(what, kind)), told)
+            yield from _new_pattern(_pattern("cause", what, kind, sort, rows, _causes(what, kind)), told)
     for kind in dict.fromkeys(one.kind for row in rows for one in row.findings):
-        yield from _told(_pattern("finding", kind, kind, sort, rows, _sees(kind)), told)
+        yield from _new_pattern(_pattern("finding", kind, kind, sort, rows, _sees(kind)), told)
     for objective in dict.fromkeys(name for row in rows for name in row.breaches):
         judged = [row for row in rows if row.is_judged]
-        yield from _told(_pattern("breach", "objective", objective, sort, judged, _breaks(objective)), told)
+        yield from _new_pattern(_pattern("breach", "objective", objective, sort, judged, _breaks(objective)), told)
 
 
 def _corrected(one: Pattern, patterns: int) -> Pattern:
@@ -137,7 +137,7 @@ def _corrected(one: Pattern, patterns: int) -> Pattern:
     return replace(one, traits=tuple(told[:MOST_TRAITS]), since=since)
 
 
-def _told(pattern: Pattern | None, told: set[frozenset[str]]) -> Iterator[Pattern]:
+def _new_pattern(pattern: Pattern | None, told: set[frozenset[str]]) -> Iterator[Pattern]:
     if pattern is None or (pattern.kind != "cause" and frozenset(pattern.affected) in told):
         return
     told.add(frozenset(pattern.affected))

@@ -54,7 +54,7 @@ class Regressions:
         if len(y) < 2 * ROWS_PER_COLUMN or np.ptp(y) == 0:
             return p
         blocks = {name: self._block(name, runs) for name in names}
-        design = self._design(_held(blocks, y), runs)
+        design = self._design(_fitted_together(blocks, y), runs)
         b = design.inverse @ (design.x.T @ y)
         left = y - design.x @ b
         freedom = len(y) - design.rank
@@ -121,7 +121,7 @@ class _Design(Record, eq=False):
         return float(fdtrc(own.shape[1], freedom, float(effect @ precision @ effect) / own.shape[1] / noise))
 
 
-def _held(blocks: dict[str, Floats], y: Floats) -> tuple[str, ...]:
+def _fitted_together(blocks: dict[str, Floats], y: Floats) -> tuple[str, ...]:
     """The blocks that are fitted together: the most correlated ones, as many columns as the runs can carry."""
     order = sorted(blocks, key=lambda name: -float(np.abs(blocks[name].T @ y).max(initial=0.0)))
     held, used = set(), 1

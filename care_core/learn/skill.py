@@ -117,7 +117,7 @@ def _probabilities(
         if v.fixed is None and v.relative is not None and v.name in outcomes
     ]
     if not relative_ones:
-        return _asked(CounterfactualQuery(model, configs[0], {}, fixed), configs)
+        return _predicted_odds(CounterfactualQuery(model, configs[0], {}, fixed), configs)
     reference = {v.name: v.default for v in schema.options if v.default is not None}
     rows = []
     for config in configs:  # each mission has thresholds of its own
@@ -126,11 +126,11 @@ def _probabilities(
         needed = {
             name: bound.for_need(float(query.predict(name, at_reference).value[0])) for name, bound in relative_ones
         }
-        rows.append(_asked(CounterfactualQuery(model, config, {}, {**fixed, **needed}), [config]))
+        rows.append(_predicted_odds(CounterfactualQuery(model, config, {}, {**fixed, **needed}), [config]))
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
-def _asked(query: CounterfactualQuery, configs: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
+def _predicted_odds(query: CounterfactualQuery, configs: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
     promised = {name: query.p_ok(name, configs) for name in query.thresholds}
     return {**promised, "all": query.probability(configs)}
 

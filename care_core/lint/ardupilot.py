@@ -53,7 +53,7 @@ def releases_of(file: LintedFile, target: str) -> tuple[tuple[Release, ...], boo
     Args:
         target: what the operator says: `copter-4.5`, `rover`; empty where nothing is said.
     """
-    asked = _asked(*_words(target)) if target else _asked(*_header(file.text))
+    asked = _releases_of(*_words(target)) if target else _releases_of(*_header(file.text))
     if asked:
         return asked, True
     known = {entry.name: ardupilot.known_in(entry.name) for entry in file.entries}
@@ -84,7 +84,7 @@ def _header(text: str) -> tuple[str, str]:
     return _LETTERS[vehicle], version
 
 
-def _asked(letter: str, version: str) -> tuple[Release, ...]:
+def _releases_of(letter: str, version: str) -> tuple[Release, ...]:
     own = tuple(one for one in ardupilot.ALL if one.vehicle == letter)
     return tuple(one for one in own if one.version == version) or own
 
@@ -119,8 +119,10 @@ def _elsewhere(file: LintedFile, entry: Entry, releases: Sequence[Release], is_t
     new = _renamed(entry.name, releases)
     is_sure = is_told and (new is not None or all(_parts(one) >= _COMPLETE for one in releases))
     severity = Severity.WARNING if is_sure else Severity.NOTE
-    told = _told(releases) if is_told else f"the releases that know most of this file ({_told(releases)})"
-    known = _told([one for one in ardupilot.ALL if one in ardupilot.known_in(entry.name)])
+    told = (
+        _release_span(releases) if is_told else f"the releases that know most of this file ({_release_span(releases)})"
+    )
+    known = _release_span([one for one in ardupilot.ALL if one in ardupilot.known_in(entry.name)])
     if new:
         return file.problem("renamed", severity, entry, f"{entry.name} is {new[0]} in {told}.", new[1], _LISTS)
     text = f"{entry.name} is not in {told}, but in {known}."
@@ -136,7 +138,7 @@ def _renamed(name: str, releases: Sequence[Release]) -> tuple[str, str] | None:
     return None
 
 
-def _told(releases: Sequence[Release]) -> str:
+def _release_span(releases: Sequence[Release]) -> str:
     if len(releases) == 1:
         return str(releases[0])
     vehicles = list(dict.fromkeys(one.vehicle for one in releases))

@@ -86,7 +86,7 @@ def _slower(file: LintedFile, held: Readers) -> Iterator[Problem]:
             (limits[0], _FORWARDS, "m/s", "drives"),
             (limits[-1], _TURNS, "rad/s", "turns"),
         ):
-            top = _one(held, names)
+            top = _only_value(held, names)
             if top is not None and 0 < limit < (top.number or 0.0) * _SAME:
                 text = (
                     f"max_velocity of velocity_smoother lets {limit:g} {unit} through, and {top.keys[-1]} is "
@@ -95,7 +95,7 @@ def _slower(file: LintedFile, held: Readers) -> Iterator[Problem]:
                 yield file.warning("hinders", entry, text, "Give both the same.", _CLAMPED, [top])
 
 
-def _one(held: Readers, names: Mapping[str, Sequence[str]]) -> Entry | None:
+def _only_value(held: Readers, names: Mapping[str, Sequence[str]]) -> Entry | None:
     """The only value of a controller's limit; None where there is none, or several differ."""
     found = [one for owner, several in names.items() for reader in held.of(owner) if (one := reader.first(several))]
     return found[0] if found and len({one.number for one in found}) == 1 else None

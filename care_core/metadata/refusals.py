@@ -97,7 +97,7 @@ def refusal_reads(text: str, kind: str, names: Collection[str]) -> RefusalReads:
         kind: the kind of vehicle (`ardupilot.VEHICLES`).
         names: the parameters that the vehicle has; a name of another release counts by its own.
     """
-    named = tuple(dict.fromkeys(_held(_NAME.findall(text), kind, names)))
+    named = tuple(dict.fromkeys(_names_present(_NAME.findall(text), kind, names)))
     read: list[str] = []
     must: list[Must] = []
     also: set[Also] = set()
@@ -106,7 +106,7 @@ def refusal_reads(text: str, kind: str, names: Collection[str]) -> RefusalReads:
         if match is None:
             continue
         number = next(iter(match.groups()), "")
-        read += _held(row.names(number), kind, names)
+        read += _names_present(row.names(number), kind, names)
         must += row.bound(number)
         also.add(row.also)
     return RefusalReads(
@@ -114,7 +114,7 @@ def refusal_reads(text: str, kind: str, names: Collection[str]) -> RefusalReads:
     )
 
 
-def _held(wanted: Iterable[str], kind: str, names: Collection[str]) -> Iterator[str]:
+def _names_present(wanted: Iterable[str], kind: str, names: Collection[str]) -> Iterator[str]:
     for one in wanted:
         held = alias_in(one, names, kind)
         if held is not None:

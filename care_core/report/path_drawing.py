@@ -137,7 +137,7 @@ class _Drawing(Record):
         )
         objective = escape(clean(fault.objective.variable.name))
         yield f'<title id="{name}-title">Causal paths to {objective}</title>'
-        yield f'<desc id="{name}-text">{escape(" ".join(_told(cause) for cause in causes))}</desc>'
+        yield f'<desc id="{name}-text">{escape(" ".join(_alt_text(cause) for cause in causes))}</desc>'
         ordered = sorted(edges, key=lambda edge: edge.is_first)
         for edge in ordered:
             yield from self._edge(edge)
@@ -198,7 +198,7 @@ def _signed(effect: float) -> str:
     return f"{effect:+.2f}".replace("-", "\u2212")
 
 
-def _told(cause: Cause) -> str:
+def _alt_text(cause: Cause) -> str:
     """A path in words, for who does not see it."""
     steps = [cause.path[0].name]
     for node, following in zip(cause.path, cause.path[1:], strict=False):

@@ -163,7 +163,7 @@ def _svg(plot: Plot, drawn: Drawing, frame: _Frame, name: str) -> Iterator[str]:
         f'aria-labelledby="{name}-title {name}-text">'
     )
     yield f'<title id="{name}-title">{escape(clean(plot.title))} over the mission</title>'
-    yield f'<desc id="{name}-text">{escape(clean(_told(plot, drawn)))}</desc>'
+    yield f'<desc id="{name}-text">{escape(clean(_alt_text(plot, drawn)))}</desc>'
     for band in plot.bands:
         left, right = frame.x(max(band.start_s, drawn.start_s)), frame.x(min(band.end_s, drawn.end_s))
         yield (
@@ -194,7 +194,7 @@ def _styles(lines: Sequence[Line]) -> list[str]:
     return ["wanted" if line.is_wanted else f"line{next(numbers, 8)}" for line in lines]
 
 
-def _told(plot: Plot, drawn: Drawing) -> str:
+def _alt_text(plot: Plot, drawn: Drawing) -> str:
     """The plot in words, for who does not see it."""
     parts = []
     for line in plot.lines:

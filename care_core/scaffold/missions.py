@@ -40,7 +40,7 @@ def find_missions(logs: Sequence[InputLog], bundled: Sequence[Schema]) -> Missio
     first = logs[0]
     if not is_ros(first.stack):
         kind = _vehicle_kind(first, bundled)
-        if kind and any(_found(log, {"kind": kind}) for log in logs):
+        if kind and any(_missions_in(log, {"kind": kind}) for log in logs):
             return Missions({"kind": kind}, {"kind": "arming to disarming"}, False)
         return _whole("no log holds a mission from arming to disarming that is known how to judge")
     spec, remarks = _goals(logs)
@@ -64,7 +64,7 @@ def _vehicle_kind(first: InputLog, bundled: Sequence[Schema]) -> str:
     return next(kinds, next(usual, "") if vehicle in _FLYING else "")
 
 
-def _found(log: InputLog, spec: Mapping[str, Any]) -> tuple[Any, ...]:
+def _missions_in(log: InputLog, spec: Mapping[str, Any]) -> tuple[Any, ...]:
     register_measures()
     kind, model = MISSION_KINDS[str(spec["kind"])], run_model(log.opened)
     return kind.missions(model, model.tables(kind.needs(spec)), spec)
@@ -94,7 +94,7 @@ def _goals(logs: Sequence[InputLog]) -> tuple[dict[str, Any], dict[str, str]]:
 
 def _goal_lists(logs: Sequence[InputLog], spec: Mapping[str, Any]) -> list[tuple[Goal, ...]]:
     """The goals of every mission."""
-    return [mission.shared(window).goals for log in logs for mission in _found(log, spec)]
+    return [mission.shared(window).goals for log in logs for mission in _missions_in(log, spec)]
 
 
 def _with_goals(spec: dict[str, Any], remarks: dict[str, str], goals: Sequence[tuple[Goal, ...]]) -> Missions:

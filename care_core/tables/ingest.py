@@ -94,7 +94,7 @@ def ingest(
                 journal.flush()
             since = since or time.monotonic()
             pace_s = (time.monotonic() - since) / max(len(done) - resumed - 1, 1)
-            progress(_said(len(done), failed, len(paths), len(done) - resumed, pace_s), len(done) / len(paths))
+            progress(_progress_line(len(done), failed, len(paths), len(done) - resumed, pace_s), len(done) / len(paths))
     return _collected(paths, done, resumed)
 
 
@@ -131,7 +131,7 @@ def _shared(rows: list[TableRow]) -> list[TableRow]:
     return [{sys.intern(name): value for name, value in row.items()} for row in rows]
 
 
-def _said(done: int, failed: int, count: int, now: int, pace_s: float) -> str:
+def _progress_line(done: int, failed: int, count: int, now: int, pace_s: float) -> str:
     read = f"read {done} of {count} logs, {failed} failed"
     if now < _PACE_LOGS:
         return read

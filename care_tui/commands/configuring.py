@@ -67,7 +67,7 @@ def apply(
         _write_or_print(override_of(report, config, alternative, profile), out, force=force)
         return
     edited = api.apply(report, *config, alternative=alternative, profile=profile)
-    for line in _told(edited):
+    for line in _edit_lines(edited):
         say(line)
     changed = [file for file in edited if file.edits]
     if out is None and not in_place:
@@ -124,7 +124,7 @@ def lint(
     raise typer.Exit(ExitCode.FAULT if severe else ExitCode.OK)
 
 
-def _told(edited: Sequence[EditedFile]) -> Iterator[str]:
+def _edit_lines(edited: Sequence[EditedFile]) -> Iterator[str]:
     from care_core.run import shown
 
     for edit in (edit for file in edited for edit in file.edits):

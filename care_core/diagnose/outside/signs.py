@@ -101,10 +101,10 @@ def signs_of(
 
 def _refusals(findings: Iterable[Finding]) -> frozenset[str]:
     refused = [one for one in every_finding(findings) if one.kind == "prearm" and one.severity != "info"]
-    return frozenset(plain_refusal(text) for one in refused for text in _said(one))
+    return frozenset(plain_refusal(text) for one in refused for text in _refusal_texts(one))
 
 
-def _said(refusal: Finding) -> Iterator[str]:
+def _refusal_texts(refusal: Finding) -> Iterator[str]:
     """The words of the checks that refused: of PX4, which complains of much until it is ready, the last ones."""
     if refusal.title.startswith(NOT_READY):
         yield refusal.title.removeprefix(NOT_READY)

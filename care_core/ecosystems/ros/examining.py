@@ -42,13 +42,13 @@ _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 
 def examine(drive: Drive) -> Health:
     """What happened in the recording of a drive."""
-    others = [(other, _found(other)) for other in drive.others]
-    found = (*_with_fall(_found(drive), drive.fall), *other_robots(drive, others))
+    others = [(other, _findings_of(other)) for other in drive.others]
+    found = (*_with_fall(_findings_of(drive), drive.fall), *other_robots(drive, others))
     findings = rank_findings(found, None if drive.fall is None else drive.fall.start_s)
     return Health(_robot(drive), timeline(drive), findings, _too_little(drive))
 
 
-def _found(drive: Drive) -> tuple[Finding, ...]:
+def _findings_of(drive: Drive) -> tuple[Finding, ...]:
     drive.look_at(merge_needs((READS, *(check.reads for check in CHECKS))))
     return tuple(finding for check in CHECKS for finding in check.find(drive))
 

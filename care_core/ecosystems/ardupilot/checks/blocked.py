@@ -35,7 +35,7 @@ _HELD = LIMITS.add("probability of what holds a copter", 0.9, "", "a choice: wha
 
 def find(flight: Flight) -> Iterator[Finding]:
     """The first time that it stood still although it was driven, or leant."""
-    yield from _held(flight)
+    yield from _held_copter(flight)
     driven = flight.one("THR", "ThrOut", "Speed")
     if flight.kind != "rover" or driven is None:
         return
@@ -63,7 +63,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         )
 
 
-def _held(flight: Flight) -> Iterator[Finding]:
+def _held_copter(flight: Flight) -> Iterator[Finding]:
     """Motors that push a copter against something are not asked for alike, and tell nothing of themselves."""
     if flight.held and flight.tilt is not None:
         start, end = flight.held[0][0], flight.held[-1][1]

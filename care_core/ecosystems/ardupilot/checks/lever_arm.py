@@ -104,7 +104,7 @@ def _follows(flight: Flight, arm: Floats) -> Iterator[tuple[float, tuple[float, 
     rows = during(flight.flown, inno.t)
     t, off = inno.t[rows], np.stack([inno[axis][rows] for axis in READS["XKF3"]], axis=-1)
     grid = np.arange(flight.flown[0][0] - _LEARNED_S, flight.flown[-1][1], _STEP_S)
-    given = _given(leans.t, _angles(leans.columns), rates.t, rates.columns, grid, arm)
+    given = _arm_velocity(leans.t, _angles(leans.columns), rates.t, rates.columns, grid, arm)
     found = [
         alike
         for velocity in (given, _unlearned(given))
@@ -140,7 +140,7 @@ def _angles(leans: Mapping[str, Floats]) -> tuple[Floats, Floats, Floats]:
     return np.radians(leans["Roll"]), np.radians(leans["Pitch"]), np.unwrap(np.radians(leans["Yaw"]))
 
 
-def _given(
+def _arm_velocity(
     leans_t: Floats, angles: tuple[Floats, Floats, Floats], rates_t: Floats, rates: Mapping[str, Floats], t: Floats,
     arm: Floats,
 ) -> Floats:  # fmt: skip

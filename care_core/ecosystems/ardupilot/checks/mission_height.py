@@ -51,7 +51,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         held = (t >= mission.since_s) & (t < until_s) & during(flight.airborne, t)
         if spans := lasting(t, above & by_itself & held, _LASTS_S):
             start, end = spans[0][0], spans[-1][1]
-            yield _found(flight, start, end, float(np.max(height[(t >= start) & (t <= end)])), highest)
+            yield _finding(flight, start, end, float(np.max(height[(t >= start) & (t <= end)])), highest)
             return
 
 
@@ -73,7 +73,7 @@ def _highest_m(mission: HeldMission, flight: Flight) -> float | None:
     return max(highest, (flight.setting(*_RETURN_CM) or 0.0) / 100, flight.setting(*_RETURN_M) or 0.0)
 
 
-def _found(flight: Flight, start: float, end: float, reached_m: float, highest_m: float) -> Finding:
+def _finding(flight: Flight, start: float, end: float, reached_m: float, highest_m: float) -> Finding:
     offset = flight.setting(_OFFSET) if flight.kind in ("plane", "quadplane") else None
     is_lifted = offset is not None and offset >= _LEAST_OFFSET_M
     lifted = f"; {_OFFSET} is {shown(offset)} (default 0), which is added to every height" if is_lifted else ""

@@ -115,23 +115,25 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
     values = dict(_values(flight.settings, at_s))
     is_outside = "world" in reads.also
     read = [name for name in reads.parameters if name in values and name not in flight.shown_right]
-    held = [_held(flight, name, values[name]) for name in read]
+    held = [_setting_of(flight, name, values[name]) for name in read]
     if "voltage" in reads.also:
-        yield from (_told(one, OFF, is_shown=True) for one in _of_voltage(flight, held, why))
+        yield from (_refusing(one, OFF, is_shown=True) for one in _of_voltage(flight, held, why))
         return
     broken = [one for one in reads.must if one.is_broken(values)]
-    bound = {name: _held(flight, name, values[name]) for must in broken for name in must.parameters if name in values}
+    bound = {
+        name: _setting_of(flight, name, values[name]) for must in broken for name in must.parameters if name in values
+    }
     named = [one for one in held if one.name in reads.named]
     if proven := _at_fault(list(bound.values())) or list(bound.values()):
         sure = PLAUSIBLE if is_outside else PROVEN
         for one in proven:
             only = next((value for must in broken if (value := must.value_of(one.name)) is not None), None)
-            yield _told(one, sure, _asks(one, broken, values), is_shown=True, only=only)
+            yield _refusing(one, sure, _asks(one, broken, values), is_shown=True, only=only)
     elif proven := _at_fault(named):
-        yield from (_told(one, PROVEN, is_shown=True) for one in proven)
+        yield from (_refusing(one, PROVEN, is_shown=True) for one in proven)
     else:
         sure = OFF * OUTSIDE if is_outside else OFF
-        yield from (_told(one, sure) for one in held if one.is_far_off)
+        yield from (_refusing(one, sure) for one in held if one.is_far_off)
 
 
 def _at_fault(held: Sequence[_Held]) -> list[_Held]:
@@ -169,14 +171,14 @@ def _values(settings: Mapping[str, tuple[Setting, ...]], at_s: float) -> Iterato
             yield name, float(value)
 
 
-def _held(flight: Flight, name: str, value: float) -> _Held:
+def _setting_of(flight: Flight, name: str, value: float) -> _Held:
     recorded = flight.settings[name][-1].default
     known = float(recorded) if isinstance(recorded, (int, float)) else firmware_default(name, flight.mode_kind)
     meaning = meaning_of(name, flight.mode_kind)
     return _Held(name, value, known, None if meaning is None else meaning.role)
 
 
-def _told(
+def _refusing(
     one: _Held, probability: float, asks: str = "", *, is_shown: bool = False, only: float | None = None
 ) -> Refusing:
     """`only`: the one value that its check takes."""

@@ -88,10 +88,10 @@ def find(flight: Flight) -> Iterator[Finding]:
             phases[phase.parameter] = longest._replace(costs_s=costs_s)
     worst = max(phases.values(), key=lambda phase: phase.costs_s, default=None)
     if worst is not None:
-        yield from _told(flight, worst)
+        yield from _slow_phase(flight, worst)
 
 
-def _told(flight: Flight, phase: _Slow) -> Iterator[Finding]:
+def _slow_phase(flight: Flight, phase: _Slow) -> Iterator[Finding]:
     flown = seconds_in(flight.armed)
     share = phase.costs_s / max(flown - phase.costs_s, 1.0)
     value, default = flight.setting(phase.parameter), _default(flight, phase.parameter)

@@ -131,7 +131,7 @@ class FlownMission(Record, eq=False):
 def analyse(mission: Mission) -> FlownMission:
     """Works out what was flown of a mission; use through `mission.shared`."""
     held = mission.shared(mission_held)
-    items, numbers = ({}, []) if isinstance(held, Unavailable) else (held.items, _asked(mission, held))
+    items, numbers = ({}, []) if isinstance(held, Unavailable) else (held.items, _waypoints_to_reach(mission, held))
     waypoints = tuple(Waypoint(items[n].lat, items[n].lng, items[n].alt_m) for n in numbers)
     home = home_of(mission)
     track = _track(mission, home)
@@ -179,7 +179,7 @@ def _curved(items: Mapping[int, Item], started: Mapping[int, float], start_s: fl
     return tuple(found)
 
 
-def _asked(mission: Mission, held: HeldMission) -> list[int]:
+def _waypoints_to_reach(mission: Mission, held: HeldMission) -> list[int]:
     """The waypoints that this flight was to reach."""
     own = set(held.flight(items_begun(mission)))
     return [number for number in held.waypoints if number in own]

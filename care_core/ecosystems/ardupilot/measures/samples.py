@@ -38,7 +38,7 @@ def samples(
     """The samples of a message's first instance, or of `one`, that hold numbers in all of these fields."""
     table = mission.tables.get(channel)
     first = one if one is not None or table is None else next(iter(split(channel, table)), table)
-    t = np.empty(0) if first is None else _told(first, fields)
+    t = np.empty(0) if first is None else _times_known(first, fields)
     own = flight_of(mission).repeats(channel)
     dead, dead_name = (own, "") if own or channel != "POS" else (_misled(mission), named("GPS"))
     if MESSAGES.get(channel, _ANY).at_times:
@@ -51,7 +51,7 @@ def named(channel: str) -> str:
     return f"{_NAMES[channel]} ({channel})" if channel in _NAMES else channel
 
 
-def _told(table: Table, fields: Iterable[str]) -> Floats:
+def _times_known(table: Table, fields: Iterable[str]) -> Floats:
     known = [np.isfinite(table[field]) for field in fields if field in table.columns]
     return table.t if all(one.all() for one in known) else table.t[np.logical_and.reduce(known)]
 

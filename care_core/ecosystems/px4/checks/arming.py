@@ -32,8 +32,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     first, last = flight.complaints[0][0], flight.complaints[-1][0]
     off = {name: setting for reason in reasons for name in read_by(reason) if (setting := flight.off_default(name))}
     others = "".join(f"{text}; " for text in reasons[-3:-1])
-    asked = {name: _asked(one) for name, one in off.items()}
-    values = "".join(f"; {_told(one, asked[name])}" for name, one in off.items())
+    asked = {name: _value_to_set(one) for name, one in off.items()}
+    values = "".join(f"; {_way_back_of(one, asked[name])}" for name, one in off.items())
     named = tuple(dict.fromkeys((*off, *(n for reason in reasons for n in read_by(reason) if n in _PLANNED_BY))))
     is_unsaid = all(is_bare_denial(reason) for reason in reasons)
     yield Finding(
@@ -52,14 +52,14 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     )
 
 
-def _asked(one: Setting) -> float | None:
+def _value_to_set(one: Setting) -> float | None:
     """The default to put it back to; None for what protects, and for a calibration."""
     meaning = meaning_of(one.name, PX4)
     is_set_by_hand = meaning is not None and meaning.role in SET_BY_HAND
     return float(one.default) if is_set_by_hand and isinstance(one.default, (int, float)) else None
 
 
-def _told(one: Setting, asked: float | None) -> str:
+def _way_back_of(one: Setting, asked: float | None) -> str:
     meaning = meaning_of(one.name, PX4)
     back = way_back(one.name, None if meaning is None else meaning.role, asked)
     return f"{one.name} is {shown(one.value)} (default {shown(one.default)}): {back}"

@@ -74,11 +74,13 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     most, least = flight.parameter("MPC_THR_MAX") or 1.0, flight.parameter("MPC_THR_MIN") or _LEAST
     lacks = (lift > min(_ALL, most - _NEAR_LEAST)) & (sinks - wanted > _OFF_MS) & (wanted < 0.0)
     flies_off = (lift < least + _NEAR_LEAST) & (wanted - sinks > _OFF_MS) & (sinks < -_RISES_MS)
-    lacking = _told(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust")
+    lacking = _at_its_end(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust")
     drawn_w = drawn_while_lifting(flight)
     for one in lacking:
         yield _set(flight, one, "MPC_THR_MAX", -1.0) if drawn_w is None else _unpowered(flight, one, drawn_w)
-    for one in _told(flight, _End(t, flies_off, sinks, wanted), "it rises with the motors at their least", "the least"):
+    for one in _at_its_end(
+        flight, _End(t, flies_off, sinks, wanted), "it rises with the motors at their least", "the least"
+    ):
         lasting = replace(one, severity="critical" if one.end_s - one.onset_s > _LONG_S else "warning")
         yield _set(flight, lasting, "MPC_THR_MIN", 1.0)
 
@@ -131,7 +133,7 @@ def _unpowered(flight: Px4Flight, lacking: Finding, drawn_w: float) -> Finding:
     )
 
 
-def _told(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator[Finding]:
+def _at_its_end(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator[Finding]:
     spans = [span for span in runs(end.t, end.holds) if span[1] - span[0] >= _LASTS_S]
     flown = [span for span in spans if _is_flown(flight, span) and _is_heard(flight, span)]
     if flown:

@@ -49,7 +49,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         wrong = dict(_unbalanced(rotors))
         names = [f"CA_ROTOR{n}_{field}" for fields in wrong.values() for field in fields for n in range(count)]
         if off := _off(names, flight):
-            yield _found(flight, "the rotors that it is told of do not balance", listed(list(wrong)), off)
+            yield _finding(flight, "the rotors that it is told of do not balance", listed(list(wrong)), off)
     yield from _undriven(flight, settings, count)
 
 
@@ -77,7 +77,7 @@ def _without_frame(flight: Px4Flight) -> Iterator[Finding]:
     """A frame that control allocation does not know: it commands no motor."""
     said = next((text for _, _, text in flight.messages if _NO_FRAME.search(text)), None)
     if said is not None and (off := _off(["CA_AIRFRAME"], flight)):
-        yield _found(flight, "control allocation knows no such frame", f"'{said}'", off)
+        yield _finding(flight, "control allocation knows no such frame", f"'{said}'", off)
 
 
 def _undriven(flight: Px4Flight, settings: Mapping[str, tuple[Setting, ...]], count: int) -> Iterator[Finding]:
@@ -92,7 +92,7 @@ def _undriven(flight: Px4Flight, settings: Mapping[str, tuple[Setting, ...]], co
     taken = taken or _off(["CA_ROTOR_COUNT"], flight)
     if taken:
         motors = listed([f"motor {n + 1}" for n in missing])
-        yield _found(
+        yield _finding(
             flight, f"no output drives {motors}", f"{len(driven & set(range(count)))} of {count} are driven", taken
         )
 
@@ -102,7 +102,7 @@ def _off(names: Sequence[str], flight: Px4Flight) -> dict[str, Setting]:
     return {name: one for name in names if (one := flight.off_default(name)) is not None}
 
 
-def _found(flight: Px4Flight, title: str, evidence: str, off: Mapping[str, Setting]) -> Finding:
+def _finding(flight: Px4Flight, title: str, evidence: str, off: Mapping[str, Setting]) -> Finding:
     values = "; ".join(f"{one.name} is {shown(one.value)} (default {shown(one.default)})" for one in off.values())
     start, end = flight.armed[0]
     return Finding(

@@ -37,7 +37,7 @@ def find(drive: Drive) -> Iterator[Finding]:
     fall = drive.fall
     if fall is not None:
         yield _fallen(drive, fall)
-    yield from _held(drive, np.inf if fall is None else fall.start_s - CONTACT_S)
+    yield from _stays_after_contact(drive, np.inf if fall is None else fall.start_s - CONTACT_S)
 
 
 def _fallen(drive: Drive, fall: Fall) -> Finding:
@@ -61,7 +61,7 @@ def _fallen(drive: Drive, fall: Fall) -> Finding:
     )
 
 
-def _held(drive: Drive, until_s: float) -> Iterator[Finding]:
+def _stays_after_contact(drive: Drive, until_s: float) -> Iterator[Finding]:
     """The first contact after which the robot gets no further, though a goal is left or it is commanded to move."""
     odometry = drive.odometry
     if odometry is None:

@@ -70,7 +70,7 @@ def _waiting(flight: Flight, driven: Table) -> Iterator[Finding]:
     spans = lasting(driven.t, waits, _WAITS_S)
     has_driven = bool((_in_mission(flight, driven) & ~stands).any())
     if name is not None and spans and not has_driven:
-        yield _told(
+        yield _finding(
             flight, name, _default(flight, name), spans[0], "it waits to be set off",
             f"for {spans[0][1] - spans[0][0]:.0f} s in Auto with no throttle (limit {_WAITS_S:g} s)",
         )  # fmt: skip
@@ -85,7 +85,7 @@ def _backwards(flight: Flight, driven: Table) -> Iterator[Finding]:
     by_itself = flight.drives_itself(driven.t)
     outputs = _outputs(flight, THROTTLE)
     if (spans := lasting(driven.t, by_itself & against, _LASTS_S)) and len(outputs) == 1:
-        yield _told(
+        yield _finding(
             flight, *_reversed(flight, outputs[0]), spans[0], "it drives against its throttle",
             f"for {spans[0][1] - spans[0][0]:.0f} s with throttle and speed of opposite signs (limit {_LASTS_S:g} s)",
         )  # fmt: skip
@@ -94,7 +94,7 @@ def _backwards(flight: Flight, driven: Table) -> Iterator[Finding]:
     if is_bot and (spans := lasting(driven.t, by_itself & fleeing & wanted, _LASTS_S)):
         title = "it is driven as a balance bot and runs away"
         shown = f"for {spans[0][1] - spans[0][0]:.0f} s against its wanted speed (limit {_LASTS_S:g} s)"
-        yield _told(flight, "FRAME_CLASS", _default(flight, "FRAME_CLASS"), spans[0], title, shown)
+        yield _finding(flight, "FRAME_CLASS", _default(flight, "FRAME_CLASS"), spans[0], title, shown)
 
 
 def _steered_against(flight: Flight, driven: Table, steered: Table) -> Iterator[Finding]:
@@ -107,7 +107,7 @@ def _steered_against(flight: Flight, driven: Table, steered: Table) -> Iterator[
         return
     agrees = float(np.corrcoef(asked, turned)[0, 1])
     if agrees <= _AGAINST:
-        yield _told(
+        yield _finding(
             flight, *_reversed(flight, outputs[0]), (float(t[0]), float(t[-1])), "it turns against its steering",
             f"correlation of steering and turn rate {agrees:.2f} over {t[-1] - t[0]:.0f} s (limit {_AGAINST:g})",
         )  # fmt: skip
@@ -124,14 +124,14 @@ def _one_wheel_against(flight: Flight, driven: Table, steered: Table) -> Iterato
     turned = [name for name in sides if _is_off(flight, name)]
     spans = lasting(t, flight.drives_itself(t) & steers & ~turns & drives, _LASTS_S)
     if spans and len(sides) == len(_SIDES) and len(turned) == 1:
-        yield _told(
+        yield _finding(
             flight, turned[0], _default(flight, turned[0]), spans[0], "it drives where it steers",
             f"for {spans[0][1] - spans[0][0]:.0f} s at full steering without a turn, and without throttle at "
             f"{np.max(np.abs(driven['Speed'][during(spans, t)])):.1f} m/s (limit {_LASTS_S:g} s)",
         )  # fmt: skip
 
 
-def _told(flight: Flight, name: str, wanted: float | None, span: Span, title: str, shown: str) -> Finding:
+def _finding(flight: Flight, name: str, wanted: float | None, span: Span, title: str, shown: str) -> Finding:
     value = flight.setting(name)
     return Finding(
         kind="drive",

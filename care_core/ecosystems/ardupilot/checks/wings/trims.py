@@ -101,7 +101,7 @@ def _of_held(surface: _Surface) -> Finding | None:
     wanted = surface.default if surface.is_default_meant else float(round(surface.held))
     what, whose = _HELD[surface.function]
     evidence = (
-        f"in straight flight the output is held at {surface.held:.0f} us, and {_told(surface)}: off by "
+        f"in straight flight the output is held at {surface.held:.0f} us, and {_as_set(surface)}: off by "
         f"{surface.off_us:.0f} us (limit {least:g})"
     )
     return _finding(surface, f"the trim of {what} is not {whose} middle", evidence, is_far, wanted, "")
@@ -115,13 +115,13 @@ def _of_rudder(flight: Flight, surface: _Surface) -> Finding | None:
         return None
     evidence = (
         f"{bank:+.0f} deg of bank in straight flight (limit {_BANK_DEG:g}), with the rudder's output at "
-        f"{surface.held:.0f} us: {_told(surface)}"
+        f"{surface.held:.0f} us: {_as_set(surface)}"
     )
     title = "it flies straight with a bank: the rudder is held over"
     return _finding(surface, title, evidence, abs(bank) > _FAR_DEG, surface.default, "ATT.Roll, ")
 
 
-def _told(surface: _Surface) -> str:
+def _as_set(surface: _Surface) -> str:
     return f"{surface.parameter} is {shown(surface.trim)} (default {shown(surface.default)})"
 
 
