@@ -11,6 +11,7 @@ from care_core.ecosystems.findings import SPINS, Finding
 from care_core.ecosystems.px4.flight import LANDED, Px4Flight
 from care_core.ecosystems.spans import inside, runs
 from care_core.logs.base import Wanted
+from care_core.numbers import median
 
 _RATE, _ASKED, _THRUST = "vehicle_angular_velocity", "vehicle_rates_setpoint", "vehicle_thrust_setpoint"
 READS: Wanted = {_RATE: ("xyz[2]",), _ASKED: ("yaw",), _THRUST: ("xyz[2]",), LANDED: ("landed",)}
@@ -19,6 +20,7 @@ _SPINS_DPS = LIMITS.add("turn against its control", 90.0, "deg/s", "a choice: a 
 _SPINS_S = LIMITS.add("shortest turn against its control", 2.0, "s", "a choice: a blow is countered sooner")
 _GAP_S = LIMITS.add("pause that still counts as one turn", 0.5, "s", "a choice: the demand flickers around a target")
 _LIFTS = LIMITS.add("thrust that flies", 0.1, "", "MPC_THR_MIN is 0.12 as shipped; what is carried asks for none")
+_SPENT = LIMITS.add("thrust with nothing left", 0.9, "", "a choice: lift comes before heading in the mixer")
 _HELD = LIMITS.add("probability of a part", 0.3, "", "a choice: what holds or strikes it shows alike")
 
 
@@ -30,13 +32,20 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         return
     t, rate = turned.t, np.nan_to_num(np.degrees(turned["xyz[2]"]))
     wanted = np.interp(t, asked.t, np.nan_to_num(asked["yaw"]))
-    flies = (np.interp(t, thrust.t, np.nan_to_num(-thrust["xyz[2]"])) > _LIFTS) & inside(flight.armed, t)
+    lift = np.interp(t, thrust.t, np.nan_to_num(-thrust["xyz[2]"]))
+    flies = (lift > _LIFTS) & inside(flight.armed, t)
     flies &= (np.interp(t, landed.t, landed["landed"]) == 0) & (t < min(flight.kills, default=np.inf))
     against = flies & (np.abs(rate) > _SPINS_DPS) & (rate * wanted < 0)
     span = next((one for one in runs(t, against, _GAP_S) if one[1] - one[0] >= _SPINS_S), None)
     if span is None:
         return
-    most = float(np.max(np.abs(rate[(t >= span[0]) & (t <= span[1])])))
+    during = (t >= span[0]) & (t <= span[1])
+    most, lifts = float(np.max(np.abs(rate[during]))), float(median(lift[during]))
+    why = (
+        "the lift takes all that the motors have, and none is left to turn it"
+        if lifts > _SPENT
+        else "something holds or struck it, a motor gave way, or motors turn the wrong way"
+    )
     yield Finding(
         kind="attitude",
         title=SPINS,
@@ -45,7 +54,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         severity="critical",
         evidence=(
             f"it turns at up to {most:.0f} deg/s for {span[1] - span[0]:.1f} s while it is told to turn the other way "
-            f"(limit {_SPINS_DPS:g}): something holds or struck it, a motor gave way, or motors turn the wrong way"
+            f"(limit {_SPINS_DPS:g}): {why}"
         ),
         source=f"{_RATE}.xyz[2], {_ASKED}.yaw",
         probability=_HELD,
