@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.blame import Blame
@@ -123,7 +123,28 @@ def of_outside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothes
     beside = _beside(lead, failed, hypotheses, promise)
     odds = _without(failed, promise, [lead.name], beside)
     changes = to_fix(query, beside, odds).changes if beside else ()
-    return Advised((outside_fix(lead, odds, failed.run, changes),), None, lead.why, lead)
+    fix = outside_fix(lead, odds, failed.run, changes)
+    return Advised((fix, *_with_one_more(lead, failed, beside, odds, promise)), None, lead.why, lead)
+
+
+def _with_one_more(
+    lead: Advisable, failed: FailedRun, beside: Assignment, odds: float, promise: Promise
+) -> Iterator[Fix]:
+    """The same for a vehicle that was refused, with the option put back without which the mission that is still before
+    it promises much less."""
+    free = _free(failed) if was_refused(failed.findings) else {}
+    sets = [{**beside, name: free[name]} for name in sorted(free.keys() - beside)]
+    reached = [_without(failed, promise, [lead.name], options) for options in sets]
+    if reached and (most := max(reached)) >= odds + GAIN_FOR_ONE_MORE:
+        options = sets[reached.index(most)]
+        yield outside_fix(lead, most, failed.run, to_fix(failed.query, options, most).changes)
+
+
+def _free(failed: FailedRun) -> dict[str, float]:
+    """The options off their reference that a change may put back, with their references."""
+    query = failed.query
+    off = failed.off - query.kept - failsafes_held(failed, failed.findings)
+    return {name: value for name in sorted(off) if query.variables[name].accepts(value := query.reference[name])}
 
 
 def with_refusals(advised: Advised, failed: FailedRun, promise: Promise) -> Advised:
@@ -172,8 +193,7 @@ def _beside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothesis]
     and those without which its change promises much less."""
     query = failed.query
     likely = {one.name for one in hypotheses if one.what == "parameter" and one.acts >= BESIDE * lead.probability}
-    off = failed.off - query.kept - failsafes_held(failed, failed.findings)
-    free = {name: value for name in sorted(off) if query.variables[name].accepts(value := query.reference[name])}
+    free = _free(failed)
     chosen = {name: value for name, value in free.items() if name in likely}
     while rest := free.keys() - chosen:
         now = promise.without([lead.name], {**query.config, **chosen})

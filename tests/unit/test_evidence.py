@@ -26,7 +26,7 @@ from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
-from care_core.run import Evidence, ProfileChoice, Run, Unavailable, gathered
+from care_core.run import Evidence, ProfileChoice, Run, Setting, Unavailable, gathered
 from care_core.variables import Role, Threshold, Variable
 from tests.planted import OPTIONS, SCHEMA, planted_run
 
@@ -264,3 +264,28 @@ def test_what_a_run_says_stands_in_order_of_time() -> None:
 def test_how_many_parameters_differ_is_told_of_the_options_alone(planted: Profile) -> None:
     notes = triage(judge(planted_run(min_sats=14), SCHEMA, planted.model), planted, CHOICE).notes
     assert any(f"1 of the profile's {len(SCHEMA.options)} parameters differs" in note for note in notes)
+
+
+def test_a_refusal_that_is_cleared_tells_what_else_the_mission_waits_for(planted: Profile) -> None:
+    """No motor of a vehicle that was refused has turned: what its options do to the mission is still to come."""
+    refused = Finding(
+        "prearm", "arming was refused: no motor 4", 1.0, 9.0, "critical", "", "MSG", "parameter", 0.97,
+        parameters=("SERVO4_FUNCTION",), wanted=(("SERVO4_FUNCTION", 36.0),),
+    )  # fmt: skip
+    run = planted_run(min_sats=14)
+    run = replace(
+        run,
+        log=replace(run.log, facts={"firmware": "ArduCopter V4.5.4"}),
+        settings={"SERVO4_FUNCTION": Setting("SERVO4_FUNCTION", 109.0, "PARM", default=0.0)},
+        metrics=dict.fromkeys(run.metrics, Unavailable("it never armed")),
+        objectives={name: 0.0 if name == "success" else Unavailable("it never armed") for name in run.objectives},
+    )
+    health = Health("", (), (refused,))
+    diagnosis = diagnose(judge(run, SCHEMA, planted.model), planted, CHOICE, health=health)
+    assert diagnosis.fix is not None
+    assert [one.option.name for one in diagnosis.fix.changes] == ["SERVO4_FUNCTION"]
+    (other,) = diagnosis.alternatives
+    assert {one.option.name for one in other.changes} == {"SERVO4_FUNCTION", "min_sats"}
+    assert other.p_fixed is not None
+    assert diagnosis.fix.p_fixed is not None
+    assert other.p_fixed > diagnosis.fix.p_fixed + 0.1
