@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
-from care_core.files import read_small_text
-from care_core.metadata.fact import Fact, codes, expanded, number
+from care_core.metadata.fact import Fact, codes, expanded, lines_of, number
 from care_core.metadata.words import word_of
 from care_core.records import Record
 
@@ -87,8 +86,7 @@ def firmware_default(name: str, kind: str) -> float | None:
 
 @cache
 def _defaults() -> Mapping[tuple[str, str], float]:
-    lines = read_small_text(_DEFAULTS).splitlines()
-    rows = (line.split("\t") for line in lines if not line.startswith(("#", "name\t")))
+    rows = (line.split("\t") for line in lines_of(_DEFAULTS)[1:])
     return {(name, vehicle): float(value) for name, vehicle, value in rows}
 
 
@@ -139,7 +137,7 @@ def _rows_of(name: str) -> tuple[_Row, ...]:
 def _lines() -> Mapping[str, list[tuple[str, str]]]:
     """The lines of the table with their patterns, by the letters that every name of a pattern begins with."""
     found: dict[str, list[tuple[str, str]]] = {}
-    for line in [line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#")][1:]:
+    for line in lines_of(_TABLE)[1:]:
         pattern, _, _ = line.partition("\t")
         found.setdefault(pattern[:_BEGINNING], []).append((pattern, line))
     return found

@@ -11,9 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Literal, TypeVar, get_args
 
-from care_core.files import read_small_text
 from care_core.metadata.aliases import aliases_of
-from care_core.metadata.fact import expanded
+from care_core.metadata.fact import expanded, lines_of
 from care_core.metadata.firmware import PX4, letter_of
 from care_core.records import Record
 
@@ -106,7 +105,7 @@ def _map_of(table: Path, vehicle: str) -> _Map:
     """The map of the vehicle with this letter: a row for it counts before one for all."""
     names: dict[str, _Cells] = {}
     families: dict[str, _Cells] = {}
-    rows = [line.split("\t") for line in read_small_text(table).splitlines() if not line.startswith("#")][1:]
+    rows = [line.split("\t") for line in lines_of(table)[1:]]
     for pattern, vehicles, role, part, read, signs in sorted(rows, key=lambda row: row[1] != ""):
         if vehicles and vehicle not in vehicles:
             continue

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Literal
 
+from care_core.files import read_small_text
 from care_core.records import Record
 
 FactType = Literal["float", "int", "bool", "enum", "str", "list", ""]
@@ -55,6 +57,11 @@ class Fact(Record):
             return not self.values
         near = _ROUNDING * max(abs(self.low or 0.0), abs(self.high or 0.0))
         return (self.low is None or value >= self.low - near) and (self.high is None or value <= self.high + near)
+
+
+def lines_of(table: Path) -> list[str]:
+    """The lines of a table, its head first, without what is said about them."""
+    return [line for line in read_small_text(table).splitlines() if not line.startswith("#")]
 
 
 def number(text: str) -> float | None:

@@ -8,8 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Literal, TypeGuard, get_args
 
-from care_core.files import read_small_text
-from care_core.metadata.fact import Fact, FactType, number
+from care_core.metadata.fact import Fact, FactType, lines_of, number
 from care_core.metadata.words import word_of
 from care_core.records import Record
 
@@ -198,9 +197,9 @@ def _by_owner(ros: Ros) -> Mapping[str, Mapping[str, list[Fact]]]:
 
 @cache
 def _table() -> tuple[Mapping[str, str], ...]:
-    lines = [line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#")]
-    columns = lines[0].split("\t")
-    return tuple(dict(zip(columns, line.split("\t"), strict=True)) for line in lines[1:])
+    head, *lines = lines_of(_TABLE)
+    columns = head.split("\t")
+    return tuple(dict(zip(columns, line.split("\t"), strict=True)) for line in lines)
 
 
 def _fact(row: Mapping[str, str], ros: Ros) -> Fact:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from functools import cache
 from pathlib import Path
 
-from care_core.files import read_small_text
+from care_core.metadata.fact import lines_of
 from care_core.metadata.navigation import spanned
 
 SOURCE = "the plugin description files of ros-navigation/navigation2, foxy to rolling"
@@ -62,5 +62,5 @@ def _releases() -> Mapping[str, frozenset[str]]:
 
 @cache
 def _table() -> tuple[tuple[str, str, str], ...]:
-    lines = [line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#")]
-    return tuple((base, name, releases) for base, name, releases in (line.split("\t") for line in lines[1:]))
+    rows = (line.split("\t") for line in lines_of(_TABLE)[1:])
+    return tuple((base, name, releases) for base, name, releases in rows)

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
-from care_core.files import read_small_text
-from care_core.metadata.fact import Fact, FactType, codes, expanded, number
+from care_core.metadata.fact import Fact, FactType, codes, expanded, lines_of, number
 from care_core.records import Record
 
 _TABLE = Path(__file__).with_name("px4.tsv")
@@ -94,8 +93,7 @@ def _fact(name: str, row: _Row, releases: Iterable[str]) -> Fact:
 @cache
 def _rows() -> Mapping[str, list[_Row]]:
     found: dict[str, list[_Row]] = {}
-    lines = [line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#")][1:]
-    for line in lines:
+    for line in lines_of(_TABLE)[1:]:
         pattern, releases, *cells = line.split("\t")
         row = _Row(_releases(releases), tuple(cells))
         for name in expanded(pattern):

@@ -13,9 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Literal, get_args
 
-from care_core.files import read_small_text
 from care_core.metadata.aliases import alias_in
-from care_core.metadata.fact import expanded
+from care_core.metadata.fact import expanded, lines_of
 from care_core.metadata.output_functions import MOTORS
 from care_core.records import Record
 
@@ -158,9 +157,8 @@ def _number(side: str, values: Mapping[str, float]) -> float | None:
 
 @cache
 def _rows() -> tuple[_Row, ...]:
-    lines = [line for line in read_small_text(TABLE).splitlines() if not line.startswith("#")][1:]
     rows = []
-    for text, reads, must, also in (line.split("\t") for line in lines):
+    for text, reads, must, also in (line.split("\t") for line in lines_of(TABLE)[1:]):
         pattern = re.escape(text).replace(r"\{n\}", r"(\d+)").replace(r"\{x\}", ".*?")
         bound = tuple(must.split("; ")) if must else ()
         rows.append(_Row(re.compile(pattern, re.IGNORECASE), tuple(reads.split()), bound, _also(also)))

@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import cast
 
-from care_core.files import read_small_text
 from care_core.metadata.causal_map import SIGNS, Sign
+from care_core.metadata.fact import lines_of
 from care_core.metadata.firmware import letter_of
 from care_core.records import Record
 
@@ -52,9 +52,7 @@ def screened(kind: str) -> tuple[str, ...]:
 def _lines() -> Mapping[tuple[str, str], tuple[str, ...]]:
     """The lines of each parameter and vehicle."""
     found: dict[tuple[str, str], list[str]] = {}
-    lines = (line for line in read_small_text(TABLE).splitlines() if not line.startswith("#"))
-    next(lines)
-    for line in lines:
+    for line in lines_of(TABLE)[1:]:
         name, vehicle, rest = line.split("\t", 2)
         found.setdefault((name, vehicle), []).append(rest)
     return {key: tuple(rests) for key, rests in found.items()}
