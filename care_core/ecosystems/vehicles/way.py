@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -132,6 +132,20 @@ class Track(Record, eq=False):
         )
 
 
+class Flown(Protocol):
+    """What was flown of a mission, of whatever firmware."""
+
+    @property
+    def track(self) -> Track | None: ...
+
+    @property
+    def end(self) -> tuple[float, float] | None:
+        """North and east of where the mission ends; None where it does not say, or did not come there."""
+
+    @property
+    def phases(self) -> Mapping[tuple[str, int], Phase]: ...
+
+
 def phases_home(
     track: Track, homeward_s: float, end_s: float, slow_below_m: float, *, returns: bool
 ) -> dict[str, Phase]:
@@ -179,6 +193,29 @@ def span_in(phases: Mapping[tuple[str, int], Phase], args: Mapping[str, Any]) ->
     if phase is None:
         return Unavailable(f"the flight did not complete '{name}{f' {index}' if index else ''}'")
     return phase.start_s, phase.end_s
+
+
+def landing_error(flown: Flown | Unavailable, no_track: Unavailable, no_end: str) -> Value:
+    """Horizontal distance at the end of the flight from where the mission ends."""
+    if isinstance(flown, Unavailable):
+        return flown
+    if flown.track is None:
+        return no_track
+    if flown.end is None:
+        return Unavailable(no_end)
+    return math.hypot(flown.track.north[-1] - flown.end[0], flown.track.east[-1] - flown.end[1])
+
+
+def return_height(flown: Flown | Unavailable, no_track: Unavailable) -> Value:
+    """The greatest height above home since the vehicle set out for it."""
+    if isinstance(flown, Unavailable):
+        return flown
+    climb = span_in(flown.phases, {"phase": "return_climb"})
+    if isinstance(climb, Unavailable):
+        return climb
+    if flown.track is None:
+        return no_track
+    return float(flown.track.height[flown.track.t >= climb[0]].max())
 
 
 def distance_to_legs(points: Floats, corners: Floats) -> Floats:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from care_core.ecosystems.ardupilot.measures import rests
@@ -14,6 +12,7 @@ from care_core.ecosystems.ardupilot.measures.requested import requested_mission
 from care_core.ecosystems.coverage import EXTREME, SUM
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
 from care_core.ecosystems.statistic import statistic
+from care_core.ecosystems.vehicles import way
 from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.run import Unavailable, Value
 
@@ -30,14 +29,7 @@ def waypoints_reached(mission: Mission, args: Args) -> Value:
 @extractor("landing_error", needs=NEEDS, unit="m", rests_on=rests.landing)
 def landing_error(mission: Mission, args: Args) -> Value:
     """Horizontal distance at the end of the flight from where the mission ends: home, or where it lands."""
-    flown = flown_mission(mission)
-    if isinstance(flown, Unavailable):
-        return flown
-    if flown.track is None:
-        return missing("POS")
-    if flown.end is None:
-        return Unavailable("the mission does not say where it ends")
-    return math.hypot(flown.track.north[-1] - flown.end[0], flown.track.east[-1] - flown.end[1])
+    return way.landing_error(flown_mission(mission), missing("POS"), "the mission does not say where it ends")
 
 
 @extractor("waypoint_miss", needs=NEEDS, unit="m", rests_on=rests.position(EXTREME))
@@ -86,13 +78,7 @@ def cruise_speed(mission: Mission, args: Args) -> Value:
 @extractor("return_height", needs=NEEDS, unit="m", rests_on=rests.heights_of_phase)
 def return_height(mission: Mission, args: Args) -> Value:
     """The greatest height above home on the way back."""
-    span = span_of_phase(mission, {"phase": "return_climb"})
-    flown = flown_mission(mission)
-    if isinstance(span, Unavailable):
-        return span
-    if isinstance(flown, Unavailable) or flown.track is None:
-        return missing("POS")
-    return float(flown.track.height[flown.track.t >= span[0]].max())
+    return way.return_height(flown_mission(mission), missing("POS"))
 
 
 @extractor("distance", needs=NEEDS, unit="m", rests_on=rests.position(SUM))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -21,6 +20,7 @@ from care_core.ecosystems.px4.measures.flown import (
 from care_core.ecosystems.px4.measures.requested import ITEM, requested_mission
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.statistic import statistic
+from care_core.ecosystems.vehicles import way
 from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.run import Unavailable, Value
 
@@ -96,25 +96,13 @@ def items_reached(mission: Mission, args: Args) -> Value:
 @extractor("px4_landing_error", needs=NEEDS, unit="m", rests_on=landing)
 def landing_error(mission: Mission, args: Args) -> Value:
     """Horizontal distance at the end of the flight from where the mission ends: home, or where it lands."""
-    flown = flown_mission(mission)
-    if isinstance(flown, Unavailable):
-        return flown
-    if flown.track is None:
-        return missing(POSITION)
-    if flown.end is None:
-        return Unavailable("the mission did not come to where it ends")
-    return math.hypot(flown.track.north[-1] - flown.end[0], flown.track.east[-1] - flown.end[1])
+    return way.landing_error(flown_mission(mission), missing(POSITION), "the mission did not come to where it ends")
 
 
 @extractor("px4_return_height", needs=NEEDS, unit="m", rests_on=heights_of_phase)
 def return_height(mission: Mission, args: Args) -> Value:
     """The greatest height above home on the way back."""
-    span, flown = span_of_phase(mission, {"phase": "return_climb"}), flown_mission(mission)
-    if isinstance(span, Unavailable):
-        return span
-    if isinstance(flown, Unavailable) or flown.track is None:
-        return missing(POSITION)
-    return float(flown.track.height[flown.track.t >= span[0]].max())
+    return way.return_height(flown_mission(mission), missing(POSITION))
 
 
 @extractor("px4_peak_height", needs=NEEDS, unit="m", rests_on=position(EXTREME))
