@@ -78,6 +78,17 @@ def least(way_m: float = math.inf, turn_deg: float = math.inf, rise_m: float = m
     return Motion(way_m, turn_deg, rise_m)
 
 
+def longest_repetitions(limits: Limits, of: str) -> Callable[[str, float], float]:
+    """Makes limits of how many seconds each source may repeat itself.
+
+    Args:
+        of: whose repetitions they are several times.
+    """
+    return lambda name, seconds: limits.add(
+        f"longest repetition of the {name}", seconds, "s", f"a choice: several times what {of}"
+    )
+
+
 class Shows(NamedTuple):
     """The motion that shows in a vehicle's sources, whatever wrote the log."""
 

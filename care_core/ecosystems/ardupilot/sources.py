@@ -25,6 +25,7 @@ from care_core.ecosystems.liveness import (
     Motion,
     Unconnected,
     is_part,
+    longest_repetitions,
     motion_shown,
     no_pack,
     numberless,
@@ -41,13 +42,7 @@ from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import Floats
 
 LIMITS = Limits()
-_CHOICE = "a choice: several times what any of 250 healthy logs repeats while it moves so far"
-
-
-def _s(name: str, value: float) -> float:
-    return LIMITS.add(f"longest repetition of the {name}", value, "s", _CHOICE)
-
-
+_s = longest_repetitions(LIMITS, "any of 250 healthy logs repeats while it moves so far")
 _SHOWS = motion_shown(LIMITS)
 _ANY = _SHOWS.any
 

@@ -16,6 +16,7 @@ from care_core.ecosystems.liveness import (
     Live,
     Motion,
     Unconnected,
+    longest_repetitions,
     motion_shown,
     no_pack,
     numberless,
@@ -32,13 +33,7 @@ from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import Floats
 
 LIMITS = Limits()
-_CHOICE = "a choice: several times what healthy ArduPilot vehicles repeat while they move so far"
-
-
-def _s(name: str, value: float) -> float:
-    return LIMITS.add(f"longest repetition of the {name}", value, "s", _CHOICE)
-
-
+_s = longest_repetitions(LIMITS, "healthy ArduPilot vehicles repeat while they move so far")
 _SHOWS = motion_shown(LIMITS)
 _ANY = _SHOWS.any
 

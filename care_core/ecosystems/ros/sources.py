@@ -11,7 +11,18 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from care_core.ecosystems.base import Limits
-from care_core.ecosystems.liveness import WATCHED, Frozen, Live, Motion, least, numberless, ranged, repeats, turned
+from care_core.ecosystems.liveness import (
+    WATCHED,
+    Frozen,
+    Live,
+    Motion,
+    least,
+    longest_repetitions,
+    numberless,
+    ranged,
+    repeats,
+    turned,
+)
 from care_core.ecosystems.ros.messages import (
     BATTERY,
     HEIGHT,
@@ -28,13 +39,7 @@ from care_core.logs.base import Table
 from care_core.numbers import Floats
 
 LIMITS = Limits()
-_CHOICE = "a choice: several times what any of 110 recordings repeats while the robot drives so far"
-
-
-def _s(name: str, value: float) -> float:
-    return LIMITS.add(f"longest repetition of the {name}", value, "s", _CHOICE)
-
-
+_s = longest_repetitions(LIMITS, "any of 110 recordings repeats while the robot drives so far")
 _WAY_M = LIMITS.add("way that shows in odometry, an IMU", 0.5, "m", "a choice: wheels resolve 1 cm")
 _TURN_DEG = LIMITS.add("turn that shows in odometry, an IMU", 20.0, "deg", "a choice: they resolve 1 degree")
 _FOUND_M = LIMITS.add("way that shows in a localisation", 2.0, "m", "ten times amcl's update_min_d")
