@@ -133,13 +133,7 @@ def fit(
     """
     if len(y) < MIN_ROWS:
         raise LearningError(f"A mechanism needs {MIN_ROWS} runs, the table has {len(y)}.", hint="Record more missions.")
-    nominal = inputs.nominal
-    if nominal is not None:
-        transform = "log"
-    transform = "identity" if binary else transform or best_transform(y)
-    coded = 2.0 * y - 1.0 if binary else transformed(y, transform)
-    if nominal is not None:
-        coded = coded - np.log(nominal.of(x[:, [inputs.names.index(name) for name in nominal.inputs]]))
+    transform, coded = _coded(x, y, inputs, transform, binary=binary)
     reads = np.flatnonzero(inputs.read)
     log, seen = inputs.log[reads], x[:, reads]
     raw = np.where(log, np.log(np.where(log, np.maximum(seen, 1e-12), 1.0)), seen)
@@ -157,7 +151,7 @@ def fit(
     mechanism = Mechanism(
         inputs=inputs.names,
         reads=reads[used],
-        nominal=nominal,
+        nominal=inputs.nominal,
         log_inputs=log[used],
         centre=centre[used],
         sd=sd[used],
@@ -172,6 +166,20 @@ def fit(
         calibration=calibration,
     )
     return Fitted(mechanism, _loss(mechanism, errors, error_sd))
+
+
+def _coded(
+    x: Floats, y: Floats, inputs: Inputs, transform: Transform | None, *, binary: bool
+) -> tuple[Transform, Floats]:
+    """The scale of a target, and the target on it: of a formula's mechanism what the formula leaves."""
+    nominal = inputs.nominal
+    if nominal is not None:
+        transform = "log"
+    transform = "identity" if binary else transform or best_transform(y)
+    coded = 2.0 * y - 1.0 if binary else transformed(y, transform)
+    if nominal is not None:
+        coded = coded - np.log(nominal.of(x[:, [inputs.names.index(name) for name in nominal.inputs]]))
+    return transform, coded
 
 
 def drawn(n: int, effort: Effort, rng: np.random.Generator) -> Rows:
