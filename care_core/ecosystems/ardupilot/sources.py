@@ -93,25 +93,30 @@ def frozen(flight: Armed, moving: Sequence[Span], sources: Sequence[Live] = SOUR
         if source.message == "RCOU" and not flight.is_copter:
             continue  # servos and throttles stay where they are
         for number, table in enumerate(flight.all(source.message, source.fields[0]), start=1):
-            fields = [field for field in source.fields if field in table.columns]
-            if source.message in _ZEROS and all(says_nothing(table[field]) for field in fields):
-                continue  # it is not connected
-            own = _fixed(table) if source.message == "GPS" else table
-            name = source.message if number == 1 else f"{source.message} {number}"
-            if not source.is_optional:
-                columns = [own[field] for field in fields]
-                yield from (Frozen(source, name, *one, None) for one in numberless(own.t, columns, source))
-            for span, count in repeats(own.t, [own[field] for field in fields], source):
-                if source.message == "BAT" and _holds_its_throttle(flight, span):
-                    continue  # one throttle takes one current, and moves no sensor that counts in steps
-                for part in overlaps(span, moving, source.seconds):
-                    motion = motion_of(flight, part, source.message)
-                    if motion.reaches(_moved(source, flight)):
-                        one = Frozen(source, name, span, count, motion)
-                        if not is_part(one, told):
-                            told.append(one)
-                            yield one
-                        break
+            for one in _frozen_in(flight, source, _named(source.message, number), table, moving):
+                if one.motion is None:
+                    yield one
+                elif not is_part(one, told):
+                    told.append(one)
+                    yield one
+
+
+def _frozen_in(flight: Armed, source: Live, name: str, table: Table, moving: Sequence[Span]) -> Iterator[Frozen]:
+    """The stretches of one instance of a source."""
+    fields = [field for field in source.fields if field in table.columns]
+    if source.message in _ZEROS and all(says_nothing(table[field]) for field in fields):
+        return  # it is not connected
+    own = _fixed(table) if source.message == "GPS" else table
+    columns = [own[field] for field in fields]
+    if not source.is_optional:
+        yield from (Frozen(source, name, *one, None) for one in numberless(own.t, columns, source))
+    for span, count in repeats(own.t, columns, source):
+        if source.message == "BAT" and _holds_its_throttle(flight, span):
+            continue  # one throttle takes one current, and moves no sensor that counts in steps
+        parts = (motion_of(flight, part, source.message) for part in overlaps(span, moving, source.seconds))
+        motion = next((one for one in parts if one.reaches(_moved(source, flight))), None)
+        if motion is not None:
+            yield Frozen(source, name, span, count, motion)
 
 
 def _holds_its_throttle(flight: Armed, span: Span) -> bool:

@@ -7,14 +7,15 @@ FS_EKF_THRESH, 0.8, of two of them for a second (ekf_check.cpp). 97.5 % of the h
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during, within
 from care_core.ecosystems.vehicles.errors import EKF_CHECK, EKF_FAILSAFE
 from care_core.logs.base import Wanted
@@ -34,23 +35,45 @@ _LANE = re.compile(r"(lane switch|EKF primary changed|switching to (compass|IMU|
 _HAS_POSITION = re.compile(r"EKF\d IMU\d is using GPS|AHRS: EKF\d active")
 
 
+class _Rejection(NamedTuple):
+    """A measurement that the estimator rejected: from when until when, and how far off it was at most."""
+
+    start_s: float
+    end_s: float
+    peak: float
+
+
 def find(flight: Flight) -> Iterator[Finding]:
     """What the estimator made of its measurements while they mattered."""
-    worst: dict[str, tuple[float, float, float]] = {}
+    worst = _rejections(flight)
+    failed = _inside(flight, [t for t, code in flight.errors(EKF_FAILSAFE) if code])
+    failed += _inside(flight, [t for t, code in flight.errors(EKF_CHECK) if code])
+    if not worst and not failed:
+        yield from _switched(flight)
+    elif not worst and (position_s := _armed_before_position(flight, failed)) is not None:
+        yield _armed_too_early(failed[0], position_s)
+    else:
+        yield _rejects(worst, failed)
+
+
+def _rejections(flight: Flight) -> dict[str, _Rejection]:
+    """By field of XKF4, of the lane that rejected it first."""
+    worst: dict[str, _Rejection] = {}
     for core in flight.all("XKF4", "SV", "SP", "SH", "SM"):
         for field in _WORDS:
             spans = lasting(core.t, (core[field] > RATIO) & during(flight.flown, core.t), _LASTS_S)
             if spans:
                 start, end = spans[0][0], spans[-1][1]
                 peak = float(np.max(core[field][(core.t >= start) & (core.t <= end)]))
-                if field not in worst or start < worst[field][0]:
-                    worst[field] = (start, end, peak)
-    failed = _inside(flight, [t for t, code in flight.errors(EKF_FAILSAFE) if code])
-    failed += _inside(flight, [t for t, code in flight.errors(EKF_CHECK) if code])
+                if field not in worst or start < worst[field].start_s:
+                    worst[field] = _Rejection(start, end, peak)
+    return worst
+
+
+def _switched(flight: Flight) -> Iterator[Finding]:
+    """Changes of its lane or sensor, where that is all that it did."""
     switched = _inside(flight, [t for t, text in flight.messages if _LANE.search(text)])
-    if not worst and not failed and not switched:
-        return
-    if not worst and not failed:
+    if switched:
         yield Finding(
             kind="estimator",
             title="the estimator changed its lane or sensor",
@@ -61,38 +84,38 @@ def find(flight: Flight) -> Iterator[Finding]:
             source="MSG",
             probability=_SWITCHED,
         )
-        return
-    if not worst and (position_s := _armed_before_position(flight, failed)) is not None:
-        yield Finding(
-            kind="estimator",
-            title="it was armed before it had a position",
-            onset_s=failed[0],
-            end_s=position_s,
-            severity="critical",
-            evidence=(
-                f"EKF check or failsafe at {log_time(failed[0])}, the estimator has a position from "
-                f"{log_time(position_s)} on; {_NEEDS_NO_ARMING} is 0: it is armed as it boots"
-            ),
-            source="ERR, MSG, PARM",
-            suspect="parameter",
-            probability=_BOOTED,
-            parameters=(_NEEDS_NO_ARMING,),
-            wanted=((_NEEDS_NO_ARMING, 1.0),),
-        )
-        return
-    start = min([span[0] for span in worst.values()] + failed)
-    end = max([span[1] for span in worst.values()] + failed)
-    said = [f"{_WORDS[field]} {peak:.1f}" for field, (_, _, peak) in sorted(worst.items(), key=lambda one: one[1][0])]
+
+
+def _armed_too_early(failed_s: float, position_s: float) -> Finding:
+    return Finding(
+        kind="estimator",
+        title="it was armed before it had a position",
+        onset_s=failed_s,
+        end_s=position_s,
+        severity="critical",
+        evidence=(
+            f"EKF check or failsafe at {log_time(failed_s)}, the estimator has a position from "
+            f"{log_time(position_s)} on; {_NEEDS_NO_ARMING} is 0: it is armed as it boots"
+        ),
+        source="ERR, MSG, PARM",
+        suspect="parameter",
+        probability=_BOOTED,
+        parameters=(_NEEDS_NO_ARMING,),
+        wanted=((_NEEDS_NO_ARMING, 1.0),),
+    )
+
+
+def _rejects(worst: Mapping[str, _Rejection], failed: list[float]) -> Finding:
+    said = [f"{_WORDS[field]} {one.peak:.1f}" for field, one in sorted(worst.items(), key=lambda pair: pair[1].start_s)]
     evidence = f"test ratios above {RATIO:g}: {', '.join(said)}" if said else "the firmware's EKF check failed"
     if failed:
         evidence += f"; EKF check or failsafe at {log_time(min(failed))}"
-    severity: Severity = "critical" if failed else "warning"
-    yield Finding(
+    return Finding(
         kind="estimator",
         title="the estimator rejects its measurements",
-        onset_s=start,
-        end_s=end,
-        severity=severity,
+        onset_s=min([one.start_s for one in worst.values()] + failed),
+        end_s=max([one.end_s for one in worst.values()] + failed),
+        severity="critical" if failed else "warning",
         evidence=evidence,
         source="XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH",
         probability=_REJECTED,

@@ -59,52 +59,51 @@ def find(flight: Flight) -> Iterator[Finding]:
     high = [span for span in spans if not climbs(flight, *span)]
     full = [span for span in saturated(flight) if _below(flight, *span) or not climbs(flight, *span)]
     if full:
-        start, end = full[0][0], full[-1][1]
-        below = _below(flight, start, end)
-        begin = min([start, *[a for a, _ in high]])
+        start = full[0][0]
         before = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
-        lasted = seconds_in(full)
-        grounded = not flight.flown and lasted > _GROUNDED_S
-        lost = flight.impact_s is not None or any(code for _, code in flight.errors(BATTERY_FAILSAFE))
-        severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
-        behind = _behind(flight)
-        since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""
-        yield Finding(
-            kind="thrust",
-            title="too little thrust",
-            onset_s=begin,
-            end_s=end,
-            severity=severity,
-            evidence=(
-                f"throttle above {since}{100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
-                + (f", {below:.1f} m below the height wanted" if below else "")
-                + f"; {100 * before:.0f} % before that"
-                + behind.why
-            ),
-            source="CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875",
-            suspect=behind.suspect,
-            probability=behind.probability,
-            parameters=behind.parameters,
-            wanted=behind.wanted,
-        )
+        yield _too_little(flight, full, min([start, *[a for a, _ in high]]), before)
     elif high and seconds_in(high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
-        share = float(median(level[flown]))
-        behind = _behind(flight)
-        yield Finding(
-            kind="thrust",
-            title=f"hovering takes {100 * share:.0f} % of the throttle",
-            onset_s=high[0][0],
-            end_s=high[-1][1],
-            severity="warning",
-            evidence=(
-                f"mean throttle {100 * share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %){behind.why}"
-            ),
-            source="CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875",
-            suspect=behind.suspect,
-            probability=behind.probability,
-            parameters=behind.parameters,
-            wanted=behind.wanted,
-        )
+        share = 100 * float(median(level[flown]))
+        evidence = f"mean throttle {share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %)"
+        title = f"hovering takes {share:.0f} % of the throttle"
+        yield _finding(flight, title, (high[0][0], high[-1][1]), "warning", evidence)
+
+
+def _too_little(flight: Flight, full: list[Span], begin: float, before: float) -> Finding:
+    """The motors give all that they have.
+
+    Args:
+        full: when they do. begin: when the throttle first was high. before: the throttle until then.
+    """
+    start, end = full[0][0], full[-1][1]
+    below, lasted = _below(flight, start, end), seconds_in(full)
+    grounded = not flight.flown and lasted > _GROUNDED_S
+    lost = flight.impact_s is not None or any(code for _, code in flight.errors(BATTERY_FAILSAFE))
+    since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""
+    evidence = f"throttle above {since}{100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
+    evidence += f", {below:.1f} m below the height wanted" if below else ""
+    evidence += f"; {100 * before:.0f} % before that"
+    severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
+    return _finding(
+        flight, "too little thrust", (begin, end), severity, f"{evidence}; {100 * before:.0f} % before that"
+    )
+
+
+def _finding(flight: Flight, title: str, span: Span, severity: Severity, evidence: str) -> Finding:
+    behind = _behind(flight)
+    return Finding(
+        kind="thrust",
+        title=title,
+        onset_s=span[0],
+        end_s=span[1],
+        severity=severity,
+        evidence=evidence + behind.why,
+        source="CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875",
+        suspect=behind.suspect,
+        probability=behind.probability,
+        parameters=behind.parameters,
+        wanted=behind.wanted,
+    )
 
 
 def saturated(flight: Flight) -> list[Span]:
