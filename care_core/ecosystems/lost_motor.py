@@ -27,7 +27,9 @@ _NEAR_LIMIT = LIMITS.add("output near its limit", 0.8, "of the range", "7 of 7: 
 _SOON_S = LIMITS.add("time around the upset in which it comes near", 1.0, "s", "a choice: then it tumbles")
 _CLEARLY = LIMITS.add("output above the next motor's", 0.08, "of the range", "7 of 7: 0.12 and more; a yaw has pairs")
 _ROSE = LIMITS.add("rise of that output", 0.15, "of the range", "7 of 7: 0.28 and more")
-_CALM_S = LIMITS.add("start of the calm before", 3.0, "s", "a choice")
+_CALM_S = LIMITS.add(
+    "start of the calm before", 3.0, "s", "a choice: long enough for a mean, and short enough for the same manoeuvre"
+)
 _CROWDED = LIMITS.add("output of the others", 0.7, "of the range", "a choice: above it all have too little")
 _TOWARDS = LIMITS.add("cosine between its arm and the fall", 0.3, "", "a choice: it lies on that side")
 _ARM_DEG = LIMITS.add("angle between motors on one arm", 5.0, "deg", "a choice: Y6 and octaquads stack two")

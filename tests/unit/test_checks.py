@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ def test_a_check_says_what_it_looks_for_and_limits_whence(ecosystem: Ecosystem, 
     assert len(set(names)) == len(names)
     for limit in check.limits:
         assert limit.source, limit.name
+        assert not re.match(r"a choice(?!: \w)", limit.source), f"{limit.name}: why so?"
         assert math.isfinite(limit.value), limit.name
 
 

@@ -40,12 +40,21 @@ _OUT_OF_CONTROL_DEG = 30.0
 """Lean error of the firmware's crash check (crash_check.cpp: CRASH_CHECK_ANGLE_DEVIATION_DEG)."""
 FOLLOWED_DEG, _BACK_S = 15.0, 5.0
 """Within this of its demand for so long in the air, it had come back."""
+_FLICK_S, _GOES_ON_S = 0.5, 2.0
+"""A gust or a jerk of the stick that is over so soon is no loss of control, where the flight goes on for so long."""
+_STAYS, _HELD = 0.6, 0.15
+"""Share of the time off its demand of what does not come back, for what swings passes it to and fro; and share of the
+rest of a flight near its demand, from which it flew on: what tumbles passes it less."""
 _OVER_DEG = 70.0
 """No copter leans this far in any mode but acro, sport and flip: ANGLE_MAX is at most 80, 30 to 45 as shipped."""
 _TAKEOFF_S = 15.0
 """A take-off takes no longer."""
 _LIFTING = 0.2
 """Throttle above which a copter is about to lift; MOT_SPIN_MIN and what armed motors idle at is below."""
+_CARRIES = 0.25
+"""Throttle above which a copter flies where nothing tells its height: a light one hovers at it, idling is below."""
+_DIPS_S, _HOPS_S = 3.0, 1.0
+"""A flight goes on over so short a dip of height or throttle, and is longer than a hop."""
 OFF_GROUND_M = 1.0
 """Height above which a copter touches nothing, whatever its legs."""
 _GROUND_M = 2.0
@@ -121,13 +130,13 @@ class Airborne(Armed):
             for rows in pieces(len(t)):
                 up[rows] = np.interp(t[rows], *height) > OFF_GROUND_M
         if throttle is not None:
-            up &= throttle[1] > 0.02
+            up &= throttle[1] > _TURNS
             if height is None:
-                up |= throttle[1] > 0.25
+                up |= throttle[1] > _CARRIES
         spans: list[Span] = []
         for start, end in self.armed:
-            spans += runs(t, up & (t >= start) & (t <= end), gap_s=3.0)
-        return tuple((a, b) for a, b in spans if b - a >= 1.0)
+            spans += runs(t, up & (t >= start) & (t <= end), gap_s=_DIPS_S)
+        return tuple((a, b) for a, b in spans if b - a >= _HOPS_S)
 
     @property
     def _on_wings(self) -> tuple[Span, ...]:
@@ -207,19 +216,20 @@ class Airborne(Armed):
         matters = during(((start - 1.0, end) for start, end in up), t) | during(self._lifting_off, t)
         flying = during(up, t)
         held = (error < FOLLOWED_DEG) & flying
-        back = runs(t, held, gap_s=0.5)
+        back = runs(t, held, gap_s=_FLICK_S)
         height = self.height
         for start, end in runs(t, off & matters & self._is_driven(t)):
             if self._reaches_after(start + _BACK_S):
                 continue
             fell_s = self._fell_from(start, height)
             until = start + _CRASH_CHECK_S if fell_s is None else fell_s
-            stays = off[(t >= start) & (t <= until)].mean() > 0.6  # else it swings
-            brief = end - start < 0.5 and end < t[-1] - 2.0 and end < self.armed[-1][1] - 2.0
+            stays = off[(t >= start) & (t <= until)].mean() > _STAYS  # else it swings
+            until_last = min(t[-1], self.armed[-1][1]) - _GOES_ON_S
+            brief = end - start < _FLICK_S and end < until_last
             if not self._hits_after(start, end) and (not stays or (brief and fell_s is None)):
                 continue
             rest = held[flying & (t > end)]
-            flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
+            flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > _HELD
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
         return min((t for t in (self._overturned_s, self._spun_s) if t is not None), default=None)

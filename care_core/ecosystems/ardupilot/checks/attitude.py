@@ -33,7 +33,7 @@ FAR_DEG = LIMITS.add("roll and pitch off their demand", 15.0, "deg", "half of Ar
 _LASTS_S = LIMITS.add("shortest time off the demand", 1.0, "s", "a choice: a gust is over sooner")
 _FLICK_S = LIMITS.add("pause that ends it", 0.3, "s", "a choice: flicks of a stick follow each other more slowly")
 YAW_DEG = LIMITS.add("heading off its demand", 45.0, "deg", "a choice: turns to a new heading come nearer")
-_YAW_LASTS_S = LIMITS.add("shortest time off the heading", 3.0, "s", "a choice")
+_YAW_LASTS_S = LIMITS.add("shortest time off the heading", 3.0, "s", "a choice: gusts turn it away for less")
 _SPINS_DPS = LIMITS.add("turn against its control", 40.0, "deg/s", "a choice: gusts turn it slower")
 _PUSHES = LIMITS.add("output that is to turn it back", 0.2, "of the range", "a choice: less hardly turns it")
 _SPINS_S = LIMITS.add("shortest turn against its control", 2.0, "s", "a choice: a blow is countered sooner")
@@ -43,11 +43,13 @@ _STILL_S = LIMITS.add(
 _BEGINS = LIMITS.add("rate at first, of a turn that gets faster", 0.8, "of it", "a choice: noise is less")
 _NEARLY = LIMITS.add("rate off a turn that is followed", 0.5, "of it", "a choice: rates lag as a turn begins")
 _TURNED = LIMITS.add("probability of wrong turning directions", 0.7, "", "a choice: yaw that is spent shows alike")
-_WAVERS_DEG = LIMITS.add("heading that wavers in a turn", 10.0, "deg", "a choice")
-_NEARER = LIMITS.add("share of the error left after a turn", 0.6, "", "a choice")
+_WAVERS_DEG = LIMITS.add("heading that wavers in a turn", 10.0, "deg", "a choice: gusts push a turn back by less")
+_NEARER = LIMITS.add(
+    "share of the error left after a turn", 0.6, "", "a choice: a turn that is followed brings it much nearer"
+)
 _OFF = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
 _LOST = LIMITS.add("probability of a part, control lost", 0.3, "", "a choice: control is lost for many reasons")
-_AFTER_S = LIMITS.add("attitude looked at after control was lost", 5.0, "s", "a choice")
+_AFTER_S = LIMITS.add("attitude looked at after control was lost", 5.0, "s", "a choice: most falls are over by then")
 _OVER = LIMITS.add("probability of what lies upside down", 0.5, "", "a choice: it turned, or its board is mounted so")
 LIMITS.add("tilt of what is upside down", UPSIDE_DOWN_DEG, "deg", "a choice: no slope and no wave")
 UPSIDE_DOWN = "the vehicle is upside down"
@@ -56,8 +58,18 @@ _KEEP_UPRIGHT = frozenset(("rover", "sub"))
 _ANY_WAY_UP = frozenset((1, 19))
 """Modes of a submarine in which the pilot may turn it over: acro, manual (ArduSub/mode.h)."""
 _LIES_S = LIMITS.add("shortest time upside down", 5.0, "s", "a choice: a flip is over sooner")
-_BEFORE_S = LIMITS.add("upright so shortly before it turned over", 10.0, "s", "a choice")
-SWING_DPS = LIMITS.add("swing of a rate around its target", 30.0, "deg/s", "a choice")
+_BEFORE_S = LIMITS.add(
+    "upright so shortly before it turned over",
+    10.0,
+    "s",
+    "a choice: it tells what turned over from what lay so from the start",
+)
+SWING_DPS = LIMITS.add(
+    "swing of a rate around its target",
+    30.0,
+    "deg/s",
+    "a choice: gusts and manoeuvres leave less, in the mean of its window",
+)
 OVER_DEMAND = LIMITS.add("swing, in movements of the target", 3.0, "", "a choice: what is told to move moves")
 _SWING_S = LIMITS.add("shortest swing", 5.0, "s", "a choice: a manoeuvre is over sooner")
 _WINDOW_S = LIMITS.add("window of a swing", 3.0, "s", "a choice: one swing comes and goes within it")
@@ -65,7 +77,9 @@ _TURNS = LIMITS.add("share of records in which a swing turns", 0.15, "", "a choi
 _EVEN = LIMITS.add("mean of a swing over its size", 0.5, "", "a choice: what stays on one side is no swing")
 _ALL = LIMITS.add("output of all that the motors have", 1.0, "", "AP_Motors.h: roll and pitch run from -1 to 1")
 _ALL_STEERING = LIMITS.add("output of all that the steering has", 4500.0, "", "AP_MotorsUGV.h")
-_GETS_ON_S = LIMITS.add("swing that keeps a rover from its way", 30.0, "s", "a choice")
+_GETS_ON_S = LIMITS.add(
+    "swing that keeps a rover from its way", 30.0, "s", "a choice: what only corrects its heading drives on sooner"
+)
 _SPENT = LIMITS.add(
     "probability of a swing that takes all the motors have", 0.85, "",
     "31 of 34 such training flights fail; all 106 that swing have a gain raised or the gyros' filter lowered",
@@ -75,7 +89,12 @@ _GROWS = LIMITS.add("growth of each swing that gets out of hand", 1.5, "", "a ch
 _SWUNG_UP = LIMITS.add("swings to either side that grow", 4, "", "a choice: two or three are a blow and what rights it")
 _LEAST_DPS = LIMITS.add("least of them", 3.0, "deg/s", "a choice: a hover's own movements")
 _LENGTHENS = LIMITS.add("times as long as the one before", 3.0, "", "a choice: a swing keeps its time")
-_OUT_OF_HAND = LIMITS.add("probability of a swing that grows until control is lost", 0.6, "", "a choice")
+_OUT_OF_HAND = LIMITS.add(
+    "probability of a swing that grows until control is lost",
+    0.6,
+    "",
+    "a choice: gains come first, and a part that gives way swings alike",
+)
 _ENOUGH = 10
 _GAINS = ("ATC_RAT_", "ATC_ANG_", "INS_GYRO_FILTER", "INS_HNTCH_", "INS_HNTC2_")
 

@@ -72,6 +72,11 @@ _ODDS = LIMITS.add("probability where a range finder contradicts it", 0.3, "", "
 _RANGE_GOOD = 4
 """RangeFinder::Status::Good (AP_RangeFinder.h)."""
 _FIX = 3
+_COMPARED, _NEAR_S, _AVERAGED_S = 10, 3.0, 5.0
+"""Fewer heights tell no drift; between fixes further apart the height is not known; and a receiver's noise is over
+sooner."""
+_AT_FIRST = 20
+"""The two begin together in the first of so many parts, which is short beside a drift."""
 
 
 class _Test(NamedTuple):
@@ -96,7 +101,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     tests = [_Test(noise, NOISE_M + _moved_between(flight, t), NOISE_M, "jumps by {:.1f} m from record to record")]
     for other in baros[1:]:
         apart = height - aligned(t, other.t, other["Alt"])
-        apart -= median(apart[: max(len(t) // 20, 3)])
+        apart -= median(apart[: max(len(t) // _AT_FIRST, 3)])
         off = np.abs(smooth(t, apart, 3.0))
         tests.append(_Test(off, np.full(len(t), APART_M), APART_M, "is {:.1f} m off the second barometer"))
     drift = _drift(flight, first)
@@ -144,7 +149,7 @@ def _contradicted(flight: Flight) -> Iterator[Finding]:
         return
     at = low.t
     apart = np.interp(at, heard.t, heard[height]) - low[distance]
-    apart = smooth(at, apart - median(apart[: max(len(apart) // 20, 3)]), 3.0)
+    apart = smooth(at, apart - median(apart[: max(len(apart) // _AT_FIRST, 3)]), 3.0)
     spans = lasting(at, np.abs(apart) > APART_M, _LASTS_S, gap_s=5.0)
     if spans:
         most = quantile(np.abs(apart)[np.abs(apart) > APART_M], 0.9)
@@ -207,13 +212,13 @@ def _drift(flight: Flight, first: Table) -> Floats | None:
         return None
     live = flight.watch(gps.t) & ~inside(flight.repeats("GPS"), gps.t)
     good = gps.where((gps["Status"] >= _FIX) & (gps["NSats"] >= _GOOD_SATS) & live)
-    if len(good) < 10:
+    if len(good) < _COMPARED:
         return None
     apart = first["Alt"] - aligned(first.t, good.t, good["Alt"])
     nearest = np.interp(first.t, good.t, good.t, left=-np.inf, right=np.inf)
-    apart = np.where(np.abs(nearest - first.t) < 3.0, apart, np.nan)
-    zero = apart[np.isfinite(apart)][: max(len(apart) // 20, 3)]
-    return smooth(first.t, np.nan_to_num(apart - median(zero)), 5.0) if len(zero) else None
+    apart = np.where(np.abs(nearest - first.t) < _NEAR_S, apart, np.nan)
+    zero = apart[np.isfinite(apart)][: max(len(apart) // _AT_FIRST, 3)]
+    return smooth(first.t, np.nan_to_num(apart - median(zero)), _AVERAGED_S) if len(zero) else None
 
 
 def _severity(flight: Flight, start: float, over: float) -> Severity:

@@ -51,7 +51,7 @@ _SPREAD = LIMITS.add("spread of the throttle to compare with", 0.15, "", "a choi
 _SHORTEST = LIMITS.add("shortest field", 185.0, "mGauss", "AP_Arming's limits of the field")
 _LONGEST = LIMITS.add("longest field", 875.0, "mGauss", "AP_Arming's limits of the field")
 _LASTS_S = LIMITS.add("shortest disturbance", 3.0, "s", "a choice: passing steel is over sooner")
-_SILENT_S = LIMITS.add("shortest silence", 1.0, "s", "a choice")
+_SILENT_S = LIMITS.add("shortest silence", 1.0, "s", "a choice: single records are lost now and then")
 _NOTHING = LIMITS.add("field that is none", 1.0, "mGauss", "a choice: the Earth's is 250 to 650")
 _RATIO = LIMITS.add("test ratio of the estimator", 1.0, "", "AP_NavEKF3: above it the compass is rejected")
 _CALIBRATION = calibrated(
@@ -68,10 +68,19 @@ _LOST = LIMITS.add(
 )  # fmt: skip
 _DEAD = LIMITS.add("probability of a dead compass", 0.95, "", "its field is zero, or it says so itself")
 _REFUSED = LIMITS.add("probability where arming was refused for it", 0.7, "", "the firmware's own word")
-_MOTORS = LIMITS.add("probability of a field that follows the motors", 0.5, "", "a choice")
-_MOTORS_MUCH = LIMITS.add("probability of one that follows them much", 0.7, "", "a choice")
+_MOTORS = LIMITS.add(
+    "probability of a field that follows the motors",
+    0.5,
+    "",
+    "a choice: battery leads do that, and many vehicles fly so",
+)
+_MOTORS_MUCH = LIMITS.add(
+    "probability of one that follows them much", 0.7, "", "a choice: more than the share that makes it unusable"
+)
 _ODD = LIMITS.add("probability of a field that the Earth does not have", 0.5, "", "a choice: steel is near, or not")
 _DOUBTED = LIMITS.add("probability where the estimator alone doubts it", 0.2, "", "a choice: mostly others are wrong")
+_REPLACES = 0.5
+"""Share of records without a field below which another compass takes its place: it has more with one than without."""
 
 
 _FIELD_WORDS = re.compile("mag field|compass|mag anomaly", re.IGNORECASE)
@@ -120,7 +129,7 @@ def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         return
     start, end = spans[0][0], spans[-1][1]
     others = [other.between(start, end) for other in compasses[1:]]
-    replaced = any(len(other) and float(_silent(other).mean()) < 0.5 for other in others)
+    replaced = any(len(other) and float(_silent(other).mean()) < _REPLACES for other in others)
     yield Finding(
         kind="compass",
         title="the compass reads nothing",

@@ -28,7 +28,7 @@ LONG_SHARE = LIMITS.add(
 FULL_LOAD = LIMITS.add("load of the scheduler", 950.0, "tenths of a per cent", "AP_Scheduler: PM.Load is 1000 at most")
 _LASTS_S = LIMITS.add("shortest overload", 5.0, "s", "a choice: a slow loop now and then harms nothing")
 _STUCK = LIMITS.add("probability where the CPU failsafe acted", 0.8, "", "the firmware's own word")
-_OVERLOADED = LIMITS.add("probability of an overload", 0.4, "", "a choice")
+_OVERLOADED = LIMITS.add("probability of an overload", 0.4, "", "a choice: most vehicles fly on with late loops")
 
 
 def find(flight: Flight) -> Iterator[Finding]:

@@ -51,23 +51,41 @@ _DPS_PER_VIBE = LIMITS.add(
     "noise that vibration adds, for each m/s^2", 0.4, "deg/s",
     "real flights with good propellers have up to 0.22, those with cut ones no more: about twice that",
 )  # fmt: skip
-_ACC_PER_VIBE = LIMITS.add("difference that vibration adds, for each m/s^2", 0.3, "m/s^2", "a choice")
+_ACC_PER_VIBE = LIMITS.add(
+    "difference that vibration adds, for each m/s^2",
+    0.3,
+    "m/s^2",
+    "a choice: two sensors on one board share most of the shaking",
+)
 _OF_RATE = LIMITS.add("share of a rate that two gyros differ by", 0.06, "", "MPU-6000: sensitivity +-3 % each")
 _FAST_DPS = LIMITS.add("rate below which that is nothing", 30.0, "deg/s", "a choice: noise is more")
-_CALM_S = LIMITS.add("time in which it hardly turns that tells of noise", 1.0, "s", "a choice")
+_CALM_S = LIMITS.add(
+    "time in which it hardly turns that tells of noise", 1.0, "s", "a choice: of less time a median is chance"
+)
 _AT_REST = LIMITS.add("share of the limit that is there where it hardly turns", 0.3, "", "sound gyros have 0.02 deg/s")
 _TURNS_OVER_S = LIMITS.add("left out before control was lost", 3.0, "s", "a choice: it turns too fast to compare")
 _USUAL_VIBE = LIMITS.add("vibration where none is recorded", 15.0, "m/s^2", "a choice: half of what is acceptable")
 _SHAKEN_DPS = LIMITS.add("shaking that hides an offset", 20.0, "deg/s", "a choice: gyros are not sampled at once")
-_OFFSET_OVER_S = LIMITS.add("window of an offset", 15.0, "s", "a choice")
+_OFFSET_OVER_S = LIMITS.add(
+    "window of an offset", 15.0, "s", "a choice: noise and manoeuvres cancel over it, an offset stays"
+)
 _STEADY = LIMITS.add(
     "share of it that stays from first to last", 0.5, "", "a choice: an offset drifts, and has one sign"
 )
 _LASTS_S = LIMITS.add("shortest noise or offset", 3.0, "s", "a choice: a blow is over sooner")
 _UNHEALTHY_S = LIMITS.add("shortest time marked unhealthy", 0.5, "s", "a choice: more than one record")
-_HELD_DEG = LIMITS.add("attitude error of what no longer holds it", 10.0, "deg", "a choice")
-_HELD_SHARE = LIMITS.add("share of the flight with such an error", 0.02, "", "a choice")
-_WORSE = LIMITS.add("times the limit that cost the attitude", 1.5, "", "a choice")
+_HELD_DEG = LIMITS.add(
+    "attitude error of what no longer holds it",
+    10.0,
+    "deg",
+    "a choice: nine of ten healthy training flights are below 7 deg for 95 % of the time",
+)
+_HELD_SHARE = LIMITS.add(
+    "share of the flight with such an error", 0.02, "", "a choice: gusts and take-offs take less of it"
+)
+_WORSE = LIMITS.add(
+    "times the limit that cost the attitude", 1.5, "", "a choice: what is just over the limit may be beside the point"
+)
 _CALIBRATION = calibrated(
     LIMITS, ((1.0, 0.7), (2.0, 0.93), (10.0, 0.97)), "12 of 13 training flights with failing gyros exceed it, no other"
 )
@@ -75,9 +93,24 @@ _LOST = LIMITS.add(
     "probability that noise costs the mission", 0.15, "",
     "4 of 10 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
 )  # fmt: skip
-_OF_CHANGE = LIMITS.add("difference of a plane's gyros, as a share of its rates' change", 0.06, "", "a choice")
-_ERRORS = LIMITS.add("standard errors by which a plane's sensors differ by chance", 4.0, "", "a choice")
-_PLANE_SHAKEN_DPS = LIMITS.add("shaking of a plane that hides an offset", 12.0, "deg/s", "a choice")
+_OF_CHANGE = LIMITS.add(
+    "difference of a plane's gyros, as a share of its rates' change",
+    0.06,
+    "",
+    "a choice: they are read within that share of the time between two records",
+)
+_ERRORS = LIMITS.add(
+    "standard errors by which a plane's sensors differ by chance",
+    4.0,
+    "",
+    "a choice: chance goes beyond it once in many thousand windows",
+)
+_PLANE_SHAKEN_DPS = LIMITS.add(
+    "shaking of a plane that hides an offset",
+    12.0,
+    "deg/s",
+    "a choice: lower than of others, for a plane rolls and pitches all the time",
+)
 _FAILED = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
 _APART = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
 

@@ -26,7 +26,7 @@ READS: Wanted = {
 LIMITS = Limits()
 _ARM_M = LIMITS.add("arm of a sensor that is looked at", 0.5, "m", "a choice: shorter ones move it less than wind does")
 _TURNS_MS = LIMITS.add("velocity that the arm gives in a turn", 0.15, "m/s", "a choice: less is noise")
-_RECORDS = LIMITS.add("velocities in turns", 8, "", "a choice")
+_RECORDS = LIMITS.add("velocities in turns", 8, "", "a choice: fewer are alike by chance")
 _OFF_MS = LIMITS.add(
     "innovation of the velocity in turns", 0.18, "m/s", "nine of ten healthy training flights have below 0.1"
 )

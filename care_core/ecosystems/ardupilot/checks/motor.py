@@ -70,8 +70,10 @@ _UPRIGHT_DEG = LIMITS.add("lean of what still flies", 60.0, "deg", "a choice: be
 _CALM_DEG = LIMITS.add("attitude error before control was lost", 12.0, "deg", "a choice: what drifts off lost no motor")
 _TIPS_DEG = LIMITS.add("lean off the demand towards a motor", 10.0, "deg", "a choice: less points nowhere")
 _TOWARDS = LIMITS.add("share of a motor in that direction", 0.15, "", "a choice: it lies on that side")
-_ASKED = LIMITS.add("output of a motor that gave nothing", 0.6, "of the range", "a choice: asked for much, and clearly")
-_CLEARLY = LIMITS.add("that output above its peers", 0.15, "of the range", "a choice")
+_ASKED = LIMITS.add("output of a motor that gave nothing", 0.5, "of the range", "a choice: asked for much, and clearly")
+_CLEARLY = LIMITS.add(
+    "that output above its peers", 0.15, "of the range", "a choice: a load off its middle and wind take less"
+)
 _MOSTLY = LIMITS.add("share of records in which it is the highest", 0.6, "", "a choice: else motors take turns")
 _LEANS_S = LIMITS.add("time over which its lean is taken", 0.3, "s", "a choice: then it turns")
 _FALL_S = LIMITS.add("fall to the side that lost it", 1.2, "s", "a choice: then it tumbles")
@@ -81,13 +83,13 @@ _SWINGS_S = LIMITS.add(
 _ANSWERS_S = LIMITS.add("time to answer a new demand", 0.5, "s", "a choice: until then it is off it without a swing")
 _AT_LIMIT = LIMITS.add("output at its limit", 0.97, "of the range", "a choice: outputs are rounded")
 _LIMITED = LIMITS.add("critical share of the time at its limit", 0.2, "", "a choice: nothing is left to give")
-_FAR = LIMITS.add("critical excess, in limits", 4.0, "", "a choice")
+_FAR = LIMITS.add("critical excess, in limits", 4.0, "", "a choice: no load off its middle asks for so much")
 _FAR_LASTS_S = LIMITS.add("shortest critical excess", 2.0, "s", "a choice: a QuadPlane lands in seconds")
 _CHANGED = LIMITS.add("share of an excess that it had before", 1 / 3, "", "a choice: then it was even")
 _TURNS = LIMITS.add("share of the others' speed at which it stopped", 0.3, "", "a choice: idling is more")
 _TURNING_RPM = LIMITS.add("speed of motors that turn", 1000.0, "1/min", "a choice: idling is more")
-_TO_TURN = LIMITS.add(
-    "share of what the others are asked for at which it is to turn", 0.5, "", "a choice: what idles may stand still"
+_TOLD_TO_TURN = LIMITS.add(
+    "share of what the others are asked for at which it is to turn", 0.5, "", "a choice: what idles is asked for less"
 )
 _CALIBRATION = calibrated(
     LIMITS,
@@ -102,9 +104,16 @@ _ALWAYS = calibrated(
     "an excess from the start on",
 )
 _GAVE_LITTLE = LIMITS.add("probability where it fell towards a motor", 0.85, "", "a choice: outputs are told often")
-_PERHAPS = LIMITS.add("probability where it fell, of few records", 0.6, "", "a choice")
+_PERHAPS = LIMITS.add(
+    "probability where it fell, of few records",
+    0.6,
+    "",
+    "a choice: outputs that are told seldom may be those of the fall",
+)
 _REPORTED = LIMITS.add("probability of a reported thrust loss", 0.2, "", "a choice: it names who is asked for most")
 _STOPPED = LIMITS.add("probability of a motor that stopped", 0.95, "", "its controller's own word")
+_AROUND_S = 5.0
+"""So long around what the firmware says, a vehicle flies about as it did."""
 _THRUST_LOSS = re.compile(r"Potential Thrust Loss \((\d+)\)")
 _SOURCE = "RCOU of each motor against the middle of the others"
 
@@ -424,7 +433,7 @@ def _reported(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         match = _THRUST_LOSS.search(text)
         if match and within(flight.armed, t):
             motor = next((one for one in outputs.motors if one.number == int(match[1])), None)
-            near = np.abs(outputs.t - t) < 5.0
+            near = np.abs(outputs.t - t) < _AROUND_S
             excess = median(_joined(_excess(outputs, near)), axis=1) if near.any() else np.zeros(len(outputs.motors))
             own = float(excess[outputs.motors.index(motor)]) if motor is not None else 0.0
             is_alone = own > ALONE and float(np.sort(excess)[-2]) < _NEXT * own
@@ -446,7 +455,7 @@ def _stopped(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     usual = median(rpm, axis=0)
     turning = (usual > _TURNING_RPM) & flight.watch(t)
     asked = np.stack([np.interp(t, outputs.t, share) for share in outputs.share(slice(None))])
-    enough = _TO_TURN * median(asked, axis=0)
+    enough = _TOLD_TO_TURN * median(asked, axis=0)
     for n, (row, share) in enumerate(zip(rpm, asked, strict=False)):
         is_asked = share > enough
         if spans := lasting(t, (row < _TURNS * usual) & turning & is_asked, 0.5):

@@ -17,7 +17,9 @@ READS: Wanted = {}
 _LINKS = {RADIO_FAILSAFE: "the radio link was lost", GCS_FAILSAFE: "the ground station link was lost"}
 _WORDS = {RADIO_FAILSAFE: ("radio failsafe", "throttle failsafe"), GCS_FAILSAFE: ("gcs failsafe",)}
 LIMITS = Limits()
-_BRIEF_S = LIMITS.add("loss that explains no crash", 1.0, "s", "a choice")
+_BRIEF_S = LIMITS.add(
+    "loss that explains no crash", 1.0, "s", "a choice: a failsafe that is over so soon has moved nothing far"
+)
 _LOST = LIMITS.add("probability of a lost link", 0.8, "", "the firmware's own word")
 _BRIEF = LIMITS.add("probability of a brief loss", 0.3, "", "a choice: links drop frames now and then")
 

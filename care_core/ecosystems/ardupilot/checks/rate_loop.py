@@ -23,7 +23,12 @@ _SLOW = LIMITS.add(
     "main loop, as a share of what it is shipped with", 0.5, "", "gains as shipped leave no more room (ArduPilot wiki)"
 )
 _IN_BAND_HZ = LIMITS.add("notch in the band of the rate controllers", 30.0, "Hz", "INS_HNTCH_FREQ is 80 as shipped")
-_SURE = LIMITS.add("probability of what makes them late, where they swing", 0.9, "", "a choice")
+_SURE = LIMITS.add(
+    "probability of what makes them late, where they swing",
+    0.9,
+    "",
+    "a choice: the swing is what such a delay brings, and gains may be raised as well",
+)
 _PM_S = 10.0
 """PM.NL counts the loops of so long (AP_Scheduler)."""
 _LOOP_HZ, _NOTCH_HZ = 400.0, 80.0

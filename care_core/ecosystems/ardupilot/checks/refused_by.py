@@ -27,7 +27,10 @@ OFF = LIMITS.add(
     "probability of the parameters off their default", 0.8, "", "a choice: they are all that this check reads"
 )
 PLAUSIBLE = LIMITS.add(
-    "probability of a parameter that cannot hold, where surroundings bring such a refusal", 0.8, "", "a choice"
+    "probability of a parameter that cannot hold, where surroundings bring such a refusal",
+    0.8,
+    "",
+    "a choice: a little less than where nothing else can be",
 )
 OUTSIDE = LIMITS.add(
     "share of that where surroundings bring such a refusal", 0.5, "", "a choice: the log tells neither from the other"

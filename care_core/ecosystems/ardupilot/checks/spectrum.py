@@ -38,7 +38,7 @@ _STRONG_DPS = LIMITS.add(
     "deg/s",
     "a choice: thirty times a gyro's own (0.005 deg/s/sqrt(Hz))",
 )
-_STANDS_OUT = LIMITS.add("times what is between the lines", 10.0, "", "a choice")
+_STANDS_OUT = LIMITS.add("times what is between the lines", 10.0, "", "a choice: noise without a line varies by less")
 _SURE = LIMITS.add("probability of a notch or a low pass beside its noise", 0.8, "", "it is measured")
 _LOST = LIMITS.add("probability that it costs the mission", 0.1, "", "a choice: most vehicles fly on with it")
 _WIDE = 0.05

@@ -50,9 +50,9 @@ ROSE = LIMITS.add(
 _ROSE_HOVERING = LIMITS.add(
     "the same, of a QuadPlane", 20.0, "m/s^2", "9 of 344 sound simulated flights reach 10 to 13 as they land"
 )
-_TIMES = LIMITS.add("times of what it was before", 5.0, "", "a choice")
+_TIMES = LIMITS.add("times of what it was before", 5.0, "", "a choice: speed and throttle raise it by less")
 _CLIPS = LIMITS.add("clips of an accelerometer's range", 100, "", _PAGE)
-_MANY = LIMITS.add("critical clips, in limits", 10, "", "a choice")
+_MANY = LIMITS.add("critical clips, in limits", 10, "", "a choice: a hard landing clips less often")
 _LASTS_S = LIMITS.add("shortest vibration", 2.0, "s", "a choice: a blow fades within a second")
 _SPIN_UP_S = LIMITS.add("left out after arming", 4.0, "s", "a choice: motors that start shake")
 _RATIO = LIMITS.add("test ratio of the estimator", 1.0, "", "AP_NavEKF3: above it a measurement is rejected")

@@ -38,8 +38,15 @@ _MOST_SHARE = LIMITS.add(
 _LIKE = LIMITS.add("speed or height off what the parameter says", 0.15, "", "a choice: wind and control take some")
 _STILL_MS = LIMITS.add("speed of what waits in its place", 0.4, "m/s", "a choice: gusts move it by less")
 _SURE = LIMITS.add("probability of a parameter that a phase follows", 0.9, "", "its value and the phase agree")
-_LEAST_LOST = LIMITS.add("probability that a mission fails of a phase at the limit", 0.3, "", "a choice")
-_SURELY_LOST = LIMITS.add("probability that a mission fails of a phase far beyond", 0.9, "", "a choice")
+_LEAST_LOST = LIMITS.add(
+    "probability that a mission fails of a phase at the limit",
+    0.3,
+    "",
+    "a choice: there most missions still have the time",
+)
+_SURELY_LOST = LIMITS.add(
+    "probability that a mission fails of a phase far beyond", 0.9, "", "a choice: there hardly any has the time"
+)
 
 _RTL, _LAND, _AUTO = 6, 9, 3
 """Modes of ArduCopter (ArduCopter/mode.h)."""

@@ -24,7 +24,7 @@ _STOPPED_S = LIMITS.add("shortest stop in the air", 0.3, "s", "a choice: a desce
 _NEAR_S = LIMITS.add("time before control was lost", 2.0, "s", "it falls, then turns over")
 _FALLS_S = LIMITS.add("left out before control was lost", 0.5, "s", "a choice: it is driven to right the vehicle")
 _WEAK = LIMITS.add("probability that a motor driven harder is weak", 0.7, "", "as of ArduPilot: 9 of 12 such flights")
-_AT_LIMIT = LIMITS.add("output of a motor that can give no more", 0.97, "of the range", "a choice")
+_AT_LIMIT = LIMITS.add("output of a motor that can give no more", 0.97, "of the range", "a choice: outputs are rounded")
 _CUT = LIMITS.add("probability that the stop made it fall", 0.9, "", "what has no thrust falls")
 
 

@@ -35,7 +35,7 @@ LIMITS = Limits()
 _APART = LIMITS.add("compass off what it should read", 0.25, "", "a choice: a share of the field; 100 of 400 mGauss")
 _REFUSED = LIMITS.add("compass off it that kept the vehicle from arming", 0.1, "", "AP_Arming: 100 mGauss of the field")
 _AGREES = LIMITS.add("compass that reads what it should", 0.15, "", "a choice: calibrations differ by less")
-_MENDS = LIMITS.add("share of it that undoing leaves", 0.5, "", "a choice")
+_MENDS = LIMITS.add("share of it that undoing leaves", 0.5, "", "a choice: undoing what is to blame mends most of it")
 _EXPLAINED = LIMITS.add(
     "share of the speeding up that leans explain", 0.5, "",
     "by it the heading of 268 healthy flights is known within 7 degrees",
@@ -43,7 +43,12 @@ _EXPLAINED = LIMITS.add(
 _OFF_DEG = LIMITS.add("heading off the true one", 15.0, "deg", "twice what healthy flights have at most")
 _RIGHT_DEG = LIMITS.add("heading that is right", 20.0, "deg", "a choice: mountings are 45 degrees apart")
 _TURNED_DEG = LIMITS.add("heading of a compass that is turned", 30.0, "deg", "a choice: mountings are 45 degrees apart")
-_BETTER = LIMITS.add("share that another mounting explains more", 0.15, "", "a choice")
+_BETTER = LIMITS.add(
+    "share that another mounting explains more",
+    0.15,
+    "",
+    "a choice: of so many mountings one explains a little more by chance",
+)
 _UNTOUCHED_S = LIMITS.add(
     "shortest flight that tells against a mounting that nobody changed", 60.0, "s", "a choice: few leans are chance"
 )

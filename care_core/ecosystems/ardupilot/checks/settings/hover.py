@@ -34,7 +34,9 @@ _SWINGS = LIMITS.add(
     "",
     "305 healthy flights have 0.14 at most, in the median of the flight",
 )
-_RAISED = LIMITS.add("times its default that a gain is raised", 1.5, "", "a choice")
+_RAISED = LIMITS.add(
+    "times its default that a gain is raised", 1.5, "", "a choice: usual tuning changes a gain by less"
+)
 _HOVER = LIMITS.add("times MOT_THST_HOVER that hovering takes", 1.6, "", "a choice: loads and winds take less")
 _EDGE_S, _FEWEST = 4.0, 20
 _SURE = LIMITS.add("probability that what ends the outputs keeps it down", 0.9, "", "both flights that stayed down so")

@@ -28,7 +28,12 @@ _G = LIMITS.add("acceleration of what stands", GRAVITY, "m/s^2", "gravity, withi
 _OFF = LIMITS.add("accelerometer off it, or off another", 0.5, "m/s^2", "two thirds of ARMING_ACCTHRESH")
 _RIGHT = LIMITS.add("accelerometer that measures it", 0.2, "m/s^2", "a choice: calibrations leave less")
 _LEANS_DEG = LIMITS.add("lean of the horizon of what stands level", 5.0, "deg", "a choice: trims are below 3 degrees")
-_LEVEL_DEG = LIMITS.add("lean of what stands level by its accelerometers", 2.0, "deg", "a choice")
+_LEVEL_DEG = LIMITS.add(
+    "lean of what stands level by its accelerometers",
+    2.0,
+    "deg",
+    "a choice: grounds that vehicles start from slope by less",
+)
 _TURNED_DEG = LIMITS.add(
     "gravity off the bottom of a board", 60.0, "deg", "a choice: nothing takes off from such a slope"
 )

@@ -37,15 +37,24 @@ _TURNS_SO = LIMITS.add(
 )
 _SPEEDS_UP_SO = LIMITS.add("share of the acceleration that the outputs explain", 0.5, "", "a choice: hills and gusts")
 _OFF_US = LIMITS.add("trim off what was measured", 50.0, "us", "26 at most in 541 drives with right trims")
-_SURELY = LIMITS.add("errors of the measurement that it is off by", 4.0, "", "a choice")
+_SURELY = LIMITS.add(
+    "errors of the measurement that it is off by", 4.0, "", "a choice: chance seldom gives more than two"
+)
 _LOSES = LIMITS.add(
     "the same that surely loses a drive", 100.0, "us", "all 10 simulated drives that were off by as much"
 )
-_AS_DEFAULT = LIMITS.add("share of it within which the default is meant", 0.25, "", "a choice")
+_AS_DEFAULT = LIMITS.add(
+    "share of it within which the default is meant",
+    0.25,
+    "",
+    "a choice: the measurement tells no better how far it is off",
+)
 _NARROW = LIMITS.add("least travel of an output", 0.85, "", "a choice: a share of that at its default")
 _AT_END_US = LIMITS.add("output that is at its end", 2.0, "us", "a choice: outputs are rounded")
-_LACKS = LIMITS.add("share of what is asked that is too little", 0.8, "", "a choice")
-_LACKS_FOR = LIMITS.add("share of the drive for which it lacks", 0.1, "", "a choice")
+_LACKS = LIMITS.add("share of what is asked that is too little", 0.8, "", "a choice: what follows lags behind by less")
+_LACKS_FOR = LIMITS.add(
+    "share of the drive for which it lacks", 0.1, "", "a choice: starts and tight turns reach an end for less"
+)
 _TIMES = LIMITS.add("times the tightest turn that TURN_RADIUS is off", 2.0, "", "a choice: loads and ground change it")
 _ASKED = LIMITS.add("share of its travel that the steering used", 0.3, "", "a choice: what is steered less tells less")
 _SURE = LIMITS.add("probability of a trim", 0.95, "", "it is measured")

@@ -34,7 +34,9 @@ _MOST = LIMITS.add("highest cell", HIGHEST_V, "V", _LOW_CELL)
 _NO_CELL = LIMITS.add("cell that no pack has", NO_CELL_V, "V", "lithium polymer cells of high voltage: 4.35 V")
 _NO_PACK = LIMITS.add("cell at rest that no vehicle flies on", 2.5, "V", "lithium polymer cells are ruined below 3 V")
 _AT_REST_A = LIMITS.add("current before arming", 3.0, "A", "a choice: boards, radios and cameras draw less")
-_NONE_A = LIMITS.add("current before arming that is none", 1.0, "A", "a choice")
+_NONE_A = LIMITS.add(
+    "current before arming that is none", 1.0, "A", "a choice: a board draws less, and sensors are off by less"
+)
 _ADVISED = {
     "low": LIMITS.add("usual low level of a cell", 3.55, "V", "ArduPilot, Battery Failsafe: 3.5 V, set to a tenth"),
     "critical": LIMITS.add("usual critical level of a cell", 3.4, "V", "ArduPilot, Battery Failsafe: 3.3 V"),

@@ -28,8 +28,15 @@ READS: Wanted = {
 
 LIMITS = Limits()
 _FLIES_MS = LIMITS.add("speed over ground of flight", 8.0, "m/s", "a choice: no plane taxies so fast")
-_GIVEN_UP_S = LIMITS.add("shortest time for which the firmware gave it up", 3.0, "s", "a choice")
-_SLOW = LIMITS.add("airspeed, as a share of AIRSPEED_MIN, below which a plane stalls", 0.85, "", "a choice")
+_GIVEN_UP_S = LIMITS.add(
+    "shortest time for which the firmware gave it up", 3.0, "s", "a choice: a plane flies on as it did for less"
+)
+_SLOW = LIMITS.add(
+    "airspeed, as a share of AIRSPEED_MIN, below which a plane stalls",
+    0.85,
+    "",
+    "a choice: near the stall, which AIRSPEED_MIN is to be 25 % above (ArduPilot, Airspeed Parameters Setup)",
+)
 _SLOW_S = LIMITS.add("shortest time so slow", 2.0, "s", "a choice: a gust is over sooner")
 _SINKS_MS = LIMITS.add("sink of a stall", 3.0, "m/s", "a choice: TECS_SINK_MIN is 2 as shipped")
 _FAILED = LIMITS.add("probability of a sensor that was given up", 0.9, "", "the firmware's own word")
