@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Request, open_case, predict
+from care_core.application.case import Case, Request, open_case
 from care_core.application.configuring import DiffSide, apply_to_files, commands_of, diff_of, doubts_of
+from care_core.application.deciding import predict
 from care_core.application.history_writing import remember, remember_triage
 from care_core.application.reporting import report_of
 from care_core.application.responses import odds_over

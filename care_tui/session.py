@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
-from care_core.application.case import Case, changes_of, decided, fixes, weighed_without
+from care_core.application.case import Case
+from care_core.application.deciding import changes_of, decided, fixes, weighed_without
 from care_core.application.signals import Signal
 from care_core.configs.driven import as_number
 from care_core.diagnose.estimates import WORTH

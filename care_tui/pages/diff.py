@@ -10,8 +10,8 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 from textual.content import Content
 
-from care_core.application.case import changes_of
 from care_core.application.configuring import DiffSide
+from care_core.application.deciding import changes_of
 from care_core.diagnose.records import Cause, Fix, helps
 from care_core.errors import CareError
 from care_core.records import replace

@@ -11,7 +11,7 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 from textual.content import Content
 
-from care_core.application.case import changes_of, fixes
+from care_core.application.deciding import changes_of, fixes
 from care_core.diagnose.records import Fix, Odds
 from care_core.report.responses import Response
 from care_core.text import clean, number_of

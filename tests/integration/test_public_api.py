@@ -176,7 +176,7 @@ def test_a_case_keeps_its_log_open_and_reads_the_same_from_it(case: care_core.Ca
 
 
 def test_what_a_failed_part_explains_is_taken_off_every_prediction_as_off_the_suggestion(case: care_core.Case) -> None:
-    from care_core.application.case import predict
+    from care_core.application.deciding import predict
 
     plain = predict(case, {"LAND_SPEED": 40.0})
     motor: Key = ("hardware", "motor 2 lost thrust")

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from care_core.application.case import decided
+from care_core.application.deciding import decided
 from care_core.causal.model import Summary
 from care_core.ecosystems.findings import Event
 from care_core.errors import ConfigError, UsageError

@@ -1108,12 +1108,23 @@ def test_the_noise_of_a_monitor_is_no_cell_more() -> None:
     assert "the battery was not charged" not in [one.title for one in made.find()]
 
 
-def test_a_submarine_that_leaks() -> None:
+def leaks(firmware: str, code: float = 0.0, message: str = "") -> list[float | None]:
+    """When water is told of in a dive whose log says these at 60 s."""
     dive = Made()
-    dive.facts = {"firmware": "ArduSub V4.5.0"}
-    dive.rows["ERR"] = [(60.0, {"Subsys": 27.0, "ECode": 1.0})]
-    (found,) = [one for one in every_finding(dive.find()) if one.kind == "leak"]
-    assert (found.onset_s, found.severity) == (60.0, "critical")
+    dive.facts = {"firmware": firmware}
+    dive.rows["ERR"] = [(60.0, {"Subsys": 27.0, "ECode": code})]
+    dive.rows["MSG"] = [(60.0, {"Message": message})]
+    found = [one for one in every_finding(dive.find()) if one.kind == "leak"]
+    assert all(one.severity == "critical" for one in found)
+    return [one.onset_s for one in found]
+
+
+def test_a_submarine_that_leaks() -> None:
+    assert leaks("ArduSub V4.5.0", code=1.0) == [60.0]
+    assert leaks("ArduSub V4.5.0", message="Leak Detected") == [60.0]
+    assert leaks("ArduSub V4.5.0", message="Leak detector is set up") == []
+    assert leaks("ArduSub V4.5.0") == [], "code 0 says that it is over"
+    assert leaks("ArduCopter V4.5.0", code=1.0) == []
 
 
 @pytest.mark.parametrize(("out", "told"), [(-0.5, True), (0.5, False)])

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import care_core
-from care_core.application.case import Case, predict
+from care_core.application.case import Case
+from care_core.application.deciding import predict
 from care_core.diagnose.outside.change import (
     Advisable,
     asked_beside,

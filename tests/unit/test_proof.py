@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import care_core
-from care_core.application.case import Case, weighed_without
+from care_core.application.case import Case
+from care_core.application.deciding import weighed_without
 from care_core.application.plotting import drawn_of, ranked
 from care_core.application.proof import Proof, proof_of
 from care_core.application.signals import settled_s, trace_of, whole_of
