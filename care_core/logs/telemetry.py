@@ -144,7 +144,7 @@ class _Telemetry(Record, eq=False, dict=True):
 
     @cached_property
     def heartbeats(self) -> Table | None:
-        return self.heard("HEARTBEAT", "base_mode", "custom_mode", "type")
+        return self.heard("HEARTBEAT", "base_mode", "custom_mode", "type", "system_status")
 
     def _as_sent(self, name: str) -> Table | None:
         message, fields = _AS_SENT[name]
@@ -205,11 +205,12 @@ def _home(log: _Telemetry) -> Table | None:
 
 
 def _status(log: _Telemetry) -> Table | None:
-    """STAT: whether it was armed, by each heartbeat."""
+    """STAT: whether it was armed, and its state (MAV_STATE), by each heartbeat."""
     beats = log.heartbeats
     if beats is None:
         return None
-    return Table(beats.t, {"Armed": ((beats["base_mode"].astype(np.int64) & _ARMED_FLAG) > 0).astype(np.float64)})
+    armed = ((beats["base_mode"].astype(np.int64) & _ARMED_FLAG) > 0).astype(np.float64)
+    return Table(beats.t, {"Armed": armed, "State": beats["system_status"].astype(np.float64)})
 
 
 def _armings(log: _Telemetry) -> Table | None:

@@ -294,3 +294,26 @@ def test_what_flies_above_its_home_all_along_took_off_before_the_log_begins(
         GPS=replace(position, times=at, columns={"Spd": 14 + 0 * at}),
     )
     assert (checks(begun)["took_off"] == 1.0) is has_flown
+
+
+@pytest.mark.parametrize(
+    ("said_s", "said", "state", "named"),
+    [
+        (5.0, "PreArm: Radio failsafe on", 5.0, "radio failsafe at 10.0 s"),
+        (5.0, "", 5.0, "failsafe told by the heartbeat at 10.0 s"),
+        (5.0, "Internal Errors 0x100000", 5.0, ""),
+        (12.0, "Low battery", 4.0, "battery failsafe at 12.0 s"),
+        (5.0, "", 4.0, ""),
+    ],
+)
+def test_a_failsafe_that_the_heartbeat_tells_of_is_one(said_s: float, said: str, state: float, named: str) -> None:
+    beats = table([(float(t), float(10 <= t < 70), state) for t in range(75)], "Armed", "State")
+    mission = flown(mode=5, STAT=beats, MSG=table([(said_s, said)], "Message"))
+    checked = {check.name: check for check in KIND.checks(mission)}["no_failsafe"]
+    assert checked.value == float(not named)
+    assert checked.otherwise == named
+
+
+def test_a_failsafe_that_ends_as_it_is_armed_did_nothing() -> None:
+    beats = table([(float(t), float(10 <= t < 70), 5.0 if t < 12 else 4.0) for t in range(75)], "Armed", "State")
+    assert checks(flown(mode=5, STAT=beats))["no_failsafe"] == 1.0

@@ -258,3 +258,11 @@ def test_terrain_that_is_missing_before_arming_is_every_start() -> None:
     assert not texts(told({"ARM": ARMED, "ERR": missing}), "error")
     flown = rows((30.0, 21, 2), names=("Subsys", "ECode"))
     assert texts(told({"ARM": ARMED, "ERR": flown}), "error") == ["terrain data missing"]
+
+
+def test_a_failsafe_of_the_heartbeat_alone_is_told() -> None:
+    beats = rows(*((float(t), 1.0, 5.0 if t > 20 else 4.0) for t in range(100)), names=("Armed", "State"))
+    assert texts(told({"STAT": beats}), "failsafe") == ["failsafe told by the heartbeat, until 99.0 s"]
+    assert texts(told({"STAT": beats}), "arming") == ["armed: the log records no arming, by its status"]
+    spoken = told({"STAT": beats, "MSG": said((22.0, "Battery Failsafe"))})
+    assert texts(spoken, "failsafe") == ["Battery Failsafe"]

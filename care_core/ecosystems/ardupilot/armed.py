@@ -18,7 +18,7 @@ from care_core.numbers import Bools, Floats, median
 
 READS: Wanted = {
     "ARM": ("ArmState", "Forced", "Method"),
-    "STAT": ("Armed",),
+    "STAT": ("Armed", "State"),
     "CTUN": ("ThO", "Alt", "BAlt"),
     "POS": ("RelHomeAlt",),
     "ATT": ("Roll",),

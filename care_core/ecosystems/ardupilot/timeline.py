@@ -15,6 +15,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from care_core.ecosystems.ardupilot.armed import ArmChange
 from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.heartbeat import shown_failsafes
 from care_core.ecosystems.ardupilot.recorded import Mode
 from care_core.ecosystems.ardupilot.statistics import records
 from care_core.ecosystems.ardupilot.supply_events import supply_events
@@ -87,6 +88,7 @@ def timelines(flight: Flight, tables: Iterable[Table], ends: Sequence[float] = (
         *_arming(flight),
         *_modes(flight),
         *_errors(flight, vehicle),
+        *_shown(flight),
         *_events(flight),
         *_flown(flight),
         *_texts(flight),
@@ -135,6 +137,8 @@ def _arming(flight: Flight) -> Iterator[Event]:
             if flight.is_written_armed
             else "it needs none (ARMING_REQUIRE 0), and moves"
             if flight.is_winged and flight.setting("ARMING_REQUIRE") == 0
+            else "by its status"
+            if flight.one("STAT", "Armed") is not None
             else "by its throttle"
         )
         yield Event(flight.armed[0][0], "arming", f"armed: the log records no arming, {how}", "the log")
@@ -223,6 +227,14 @@ def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
         told = error_words(EKF_PRIMARY, code, vehicle.kind)
         again = f", and {counted(len(lanes) - 1, 'more switch', 'es')} until {log_time(lanes[-1][0], 0)}"
         yield Event(t, "error", told + (again if len(lanes) > 1 else ""), "ERR")
+
+
+def _shown(flight: Flight) -> Iterator[Event]:
+    """Failsafes of which no text speaks while they are on."""
+    for (start, end), words in shown_failsafes(flight):
+        said = flight.messages_between(start - _SAME_S, end)
+        if not any(FAILSAFE.search(text) for _, text in said):
+            yield Event(start, "failsafe", f"{words}, until {log_time(end)}", "HEARTBEAT")
 
 
 def _lasting(times: Sequence[tuple[float, float]]) -> str:

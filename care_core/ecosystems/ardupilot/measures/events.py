@@ -27,7 +27,7 @@ _STILL_S = 0.5
 """A complaint so shortly before the last attempt to arm stood when it was refused."""
 _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
     (re.compile(r"crash", re.IGNORECASE), "crash"),
-    (re.compile(rf"{FAILSAFE.pattern}|battery .* is (low|critical)", re.IGNORECASE), "failsafe"),
+    (re.compile(rf"{FAILSAFE.pattern}|battery .* is (low|critical)|^low battery\b", re.IGNORECASE), "failsafe"),
     (re.compile(r"EKF variance|lane switch|emergency yaw reset|GPS Glitch", re.IGNORECASE), "ekf"),
     (re.compile(r"thrust loss", re.IGNORECASE), "thrust"),
     (re.compile(r"vibration compensation", re.IGNORECASE), "vibration"),

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from care_core.ecosystems.ardupilot.heartbeat import shown_failsafes
 from care_core.ecosystems.ardupilot.measures.events import crash_of, errors, forced, refused_for, telling
 from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
-from care_core.ecosystems.ardupilot.measures.modes import is_armed
+from care_core.ecosystems.ardupilot.measures.modes import flight_of, is_armed
 from care_core.ecosystems.ardupilot.measures.requested import trails_m
 from care_core.ecosystems.ardupilot.measures.route import landing_error
 from care_core.ecosystems.measures import Mission
@@ -64,13 +65,17 @@ def short_of(mission: Mission) -> str:
 
 
 def event_clause(mission: Mission, kind: str) -> str:
-    """The first crash or failsafe that the autopilot reported, with its time; empty where it reported none."""
+    """The first crash or failsafe that the autopilot reported, with its time; empty where it reported none. A failsafe
+    that no text and no record tells of is told by the vehicle's heartbeat."""
     found = [
         (t, error_words(subsystem, code))
         for t, subsystem, code in errors(mission)
         if code and kind_of_error(subsystem) == kind
     ]
     found += [(t, _spoken(text, kind)) for t, text, known in telling(mission) if known == kind]
+    if not found and kind == "failsafe":
+        shown = ((start, words) for (start, _), words in shown_failsafes(flight_of(mission)))
+        found = [(t, _spoken(words, kind)) for t, words in shown if mission.start_s <= t <= mission.end_s]
     if not found:
         return ""
     time_s, words = min(found, key=lambda one: one[0])
