@@ -76,6 +76,17 @@ def test_motors_that_push_against_an_obstacle_tell_nothing_of_themselves(speed_m
     assert "motor" not in [one.kind for one in (finding, *finding.consequences)]
 
 
+def test_what_lies_with_its_motors_down_lost_none_and_is_held_by_nothing() -> None:
+    made = Made()
+    lies = made.after(FAILS_S, DOWN_S)
+    made.table["CTUN"]["ThO"][lies] = 0.13
+    made.table["RCOU"]["C3"][lies] = made.table["RCOU"]["C1"][lies] = 1500.0
+    made.table["RCOU"]["C1"][lies] += 200.0
+    made.table["ATT"]["Roll"][lies] = made.table["ATT"]["DesRoll"][lies] = 45.0
+    made.table["GPS"]["Spd"][lies] = 0.05
+    assert not {"motor", "blocked"} & {one.kind for one in every_finding(made.find())}
+
+
 def test_a_plane_was_armed_when_its_status_says_so() -> None:
     made = Made()
     made.rows = {"MODE": [(0.0, {"ModeNum": 15.0})]}
@@ -787,6 +798,17 @@ def test_a_log_that_ends_in_a_fall_below_its_home(sinks_ms: float, titles: list[
     tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
     findings = every_finding(find(flight_of(tables, made.known, made.facts, 70.0)))
     assert [one.title for one in findings if one.kind == "log"] == titles
+
+
+def test_a_log_ends_on_the_ground_by_the_barometer_whatever_the_estimate_says() -> None:
+    made = Made()
+    made.rows["ARM"].pop()
+    for name in ("BARO", "BARO#2"):
+        made.table[name]["Alt"][made.after(60.0)] = 0.0
+    made.table["CTUN"]["BAlt"][made.after(60.0)] = 0.0
+    tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
+    findings = every_finding(find(flight_of(tables, made.known, made.facts, 70.0)))
+    assert "the log ends in the air" not in [one.title for one in findings]
 
 
 def test_an_overloaded_autopilot() -> None:

@@ -97,6 +97,8 @@ class Flight(Airborne):
         leans = (np.interp(moved.t, *tilt) > _LEANS_DEG) & (np.interp(moved.t, *height) > OFF_GROUND_M)
         leans &= np.interp(moved.t, *error) < FOLLOWED_DEG
         leans &= during(self.flown, moved.t) & (moved["Status"] >= FIX)
+        if self.throttle is not None:  # what lies on its side with its motors down is held by nothing
+            leans &= np.interp(moved.t, *self.throttle) > _LIFTS
         stands = leans & (moved["Spd"] < STANDS_MS) & (moved.t > self.first_blow_s)
         rests = leans & (moved["Spd"] < _STILL_MS) & (np.interp(moved.t, *tilt) > _LEANS_FAR_DEG)
         long = ((stands, _HELD_S), (rests, _STILL_S))

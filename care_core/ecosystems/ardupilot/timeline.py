@@ -14,6 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from care_core.ecosystems.ardupilot.armed import ArmChange
+from care_core.ecosystems.ardupilot.checks.log import ends_aloft
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.heartbeat import shown_failsafes
 from care_core.ecosystems.ardupilot.recorded import Mode
@@ -34,7 +35,6 @@ from care_core.ecosystems.vehicles import (
     error_kind,
     error_words,
     event_words,
-    flies,
     is_over,
     motors_of,
     reason_words,
@@ -380,12 +380,8 @@ def _end(flight: Flight) -> Iterator[Event]:
     is_armed = changes[-1].is_armed if changes else bool(flight.armed) and flight.armed[-1][1] > flight.end_s - 1.0
     if not is_armed:
         return
-    where = ""
-    if flies(flight.kind) and (told := flight.height) is not None:
-        t, height = told
-        known = np.isfinite(height)
-        if known.any() and t[known][-1] > flight.end_s - 5.0 and height[known][-1] > _IN_AIR_M:
-            where = f" in the air, {height[known][-1]:.0f} m up"
+    aloft = ends_aloft(flight.run_at(flight.end_s))
+    where = f" in the air, {aloft}" if aloft is not None else ""
     text = f"the log ends{where} with the vehicle armed: power lost, or the recording stopped"
     yield Event(flight.end_s, "log", text, "the log")
 

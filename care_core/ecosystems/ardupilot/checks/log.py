@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats, median, pauses
 
@@ -24,6 +26,7 @@ _FALL_M, _FALLS_S = (
     LIMITS.add("fall at an end in the air", 10.0, "m", "a choice: a landing sinks 2 m/s at most, and drift less"),
     LIMITS.add("time of that fall", 2.0, "s", "a choice: longer than a step of the height as it touches down"),
 )
+_RECENT_S = LIMITS.add("age of a height of the end", 5.0, "s", "a choice: a height is recorded once a second")
 _LIFTING = LIMITS.add("throttle of an end in the air", 0.2, "", "a choice: armed motors idle below it")
 _FALLS_V = LIMITS.add(
     "fall of the board's supply", 0.3, "V", "ArduPilot, Power module and brown-outs: twice the swing that is normal"
@@ -109,17 +112,11 @@ def _inside(flight: Flight, start: Floats, end: Floats) -> Bools:
 
 def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
     """Armed and lifting at the last record: power was lost, or the recording was stopped."""
-    if not flight.armed or flight.armed[-1][1] < flight.end_s or flight.impact_s is not None:
+    aloft = ends_aloft(flight) if flight.is_copter else None
+    if aloft is None or not flight.armed or flight.armed[-1][1] < flight.end_s:
         return
     if flight.arm_changes and not flight.arm_changes[-1][1]:
         return  # it was disarmed with its last record
-    throttle, height = flight.throttle, flight.height
-    if not flight.is_copter or height is None:
-        return
-    last_m, fell_m = float(median(height[1][-3:])), _fell_m(height)
-    lifts = throttle is None or float(median(throttle[1][-3:])) > _LIFTING
-    if not (last_m > _HIGH_M and lifts) and fell_m < _FALL_M:
-        return
     sagging = _supply_falls(flight)
     yield Finding(
         kind="battery" if sagging else "log",
@@ -127,15 +124,41 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         onset_s=flight.end_s,
         end_s=flight.end_s,
         severity="critical" if sagging else "warning",
-        evidence=(
-            f"armed and falling at {fell_m / _FALLS_S:.0f} m/s at the last record: "
-            if fell_m >= _FALL_M
-            else f"armed {last_m:.0f} m up at the last record: "
-        )
+        evidence=f"armed {'and ' * aloft.is_falling}{aloft} at the last record: "
         + (sagging or "power was lost or the recording was stopped"),
         source="EV, ARM, CTUN, POS, POWR",
         probability=_POWER_LOST if sagging else _ENDS,
     )
+
+
+class Aloft(NamedTuple):
+    """Where a log ends in the air."""
+
+    height_m: float
+    fell_m: float
+    """How far it came down in the last seconds."""
+
+    @property
+    def is_falling(self) -> bool:
+        return self.fell_m >= _FALL_M
+
+    def __str__(self) -> str:
+        """As it is told: "12 m up", or "falling at 9 m/s"."""
+        return f"falling at {self.fell_m / _FALLS_S:.0f} m/s" if self.is_falling else f"{self.height_m:.0f} m up"
+
+
+def ends_aloft(flight: Flight) -> Aloft | None:
+    """How high it is at the last record; None where it lies on the ground there, crashed, or nothing tells. A copter's
+    estimate that runs away is told by its barometer, and one whose motors lift nothing is up only where it falls."""
+    known = [flight.height, flight.barometer if flight.is_copter else None]
+    heights = [one for one in known if one is not None and len(one[0]) and one[0][-1] > flight.end_s - _RECENT_S]
+    if not flies(flight.kind) or not heights or flight.impact_s is not None:
+        return None
+    told = [Aloft(float(median(m[-3:])), _fell_m((t, m))) for t, m in heights]
+    aloft = told[-1] if told[0].height_m - told[-1].height_m > _HIGH_M / 2 else told[0]
+    throttle = flight.throttle if flight.is_copter else None
+    lifts = throttle is None or float(median(throttle[1][-3:])) > _LIFTING
+    return aloft if (aloft.height_m > _HIGH_M and lifts) or aloft.is_falling else None
 
 
 def _fell_m(height: tuple[Floats, Floats]) -> float:

@@ -64,6 +64,7 @@ _LASTS_S = LIMITS.add("shortest excess", 4.0, "s", "a choice: a turn is over soo
 _TRYING_S = LIMITS.add("first seconds of trying to lift", 12.0, "s", "a choice: then integrators wind up")
 _LIFTING = LIMITS.add("output that lifts", 0.2, "of the range", "a choice: armed motors idle below it")
 _TRIES = LIMITS.add("throttle that tries to lift", 0.1, "of the range", "a choice: MOT_SPIN_MIN is 0.15 as shipped")
+_IDLES = LIMITS.add("throttle of what lies on the ground", 0.15, "of the range", "MOT_SPIN_MIN as shipped: 0.15")
 _HOVERS_MS = LIMITS.add("speed at which a QuadPlane hovers", 6.0, "m/s", "a choice: faster, its wing lifts part of it")
 _FAST_MS = LIMITS.add("speed at which a copter is far from hovering", 20.0, "m/s", "WPNAV_SPEED: 20 at most")
 _UPRIGHT_DEG = LIMITS.add("lean of what still flies", 60.0, "deg", "a choice: beyond it motors are told to right it")
@@ -204,9 +205,12 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Bools:
     lifting &= _hovers(flight, t)
     if (tilt := flight.tilt) is not None:
         lifting &= np.interp(t, *tilt) < _UPRIGHT_DEG
+    throttle = flight.throttle
     if flight.flown:
+        if throttle is not None and flight.is_copter:  # what lies with its motors down rights itself in vain
+            lifting &= np.interp(t, *throttle) > _IDLES
         return lifting & during(flight.flown, t)
-    if (throttle := flight.throttle) is not None:  # what idles winds up its integrators against the ground
+    if throttle is not None:  # what idles winds up its integrators against the ground
         lifting &= np.interp(t, *throttle) > _TRIES
     return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting
 
