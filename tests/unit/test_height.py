@@ -57,3 +57,31 @@ def test_a_barometer_that_leaves_the_receiver_and_the_estimate_is_no_runaway() -
     for name, field in (("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt")):
         made.table[name][field] += away
     assert TITLE not in [one.title for one in every_finding(made.find())]
+
+
+@pytest.mark.parametrize(("off_ms", "mode", "is_told"), [(3.0, 5.0, True), (3.0, 0.0, False), (1.0, 5.0, False)])
+def test_a_climb_rate_that_the_barometer_contradicts(off_ms: float, mode: float, is_told: bool) -> None:
+    made = Made()
+    made.rows["MODE"] = [(0.0, {"ModeNum": mode})]
+    made.table["CTUN"]["CRt"] = 100.0 * np.gradient(made.table["CTUN"]["Alt"], made.t)
+    made.table["CTUN"]["CRt"][made.after(40.0, 50.0)] += 100.0 * off_ms
+    assert ("the estimated climb rate runs away from the barometer's" in [one.title for one in made.find()]) is is_told
+
+
+def test_accelerometers_that_do_not_feel_gravity_bring_it_about() -> None:
+    made = Made()
+    made.table["CTUN"]["CRt"] = 100.0 * np.gradient(made.table["CTUN"]["Alt"], made.t)
+    made.table["CTUN"]["CRt"][made.after(40.0, 50.0)] -= 300.0
+    for table in ("IMU", "IMU#2"):
+        made.table[table]["AccZ"] += 1.6
+    finding = made.find()[0]
+    assert (finding.kind, finding.severity) == ("imu", "critical")
+    assert [one.kind for one in finding.consequences] == ["estimator"]
+
+
+def test_a_receiver_that_rises_with_the_estimate_shows_a_wrong_barometer() -> None:
+    made = Made()
+    climbs = 3.0 * np.clip(made.t - 40.0, 0.0, 10.0)
+    made.table["CTUN"]["CRt"] = 100.0 * np.gradient(made.table["CTUN"]["Alt"] + climbs, made.t)
+    made.table["GPS"]["Alt"] += climbs
+    assert "estimator" not in [one.kind for one in every_finding(made.find())]

@@ -1,4 +1,4 @@
-"""An estimated height that runs away from the barometer's, by which the estimator holds it.
+"""An estimated height or climb that runs away from the barometer's, by which the estimator holds it.
 
 The estimator carries the height on by the accelerometers and corrects it by the barometer (EK3_SRC1_POSZ 1, and before
 4.1 EK2_ALT_SOURCE 0 as shipped). Accelerometers that are far off, or a barometer that it rejects, part them; the
@@ -12,20 +12,23 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.recorded import Mode
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.spans import Span, during
+from care_core.ecosystems.spans import Span, during, seconds_in
 from care_core.geodesy import GRAVITY
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import Floats, median, quantile
+from care_core.numbers import Bools, Floats, median, quantile
 
 _AXES = ("AccX", "AccY", "AccZ")
-READS: Wanted = {"IMU": _AXES, "GPS": ("Alt", "Status")}
+READS: Wanted = {"IMU": _AXES, "GPS": ("Alt", "Status"), "CTUN": ("CRt",)}
 
 LIMITS = Limits()
 _APART_M = LIMITS.add("estimate off the barometer", 5.0, "m", "five times what arming allows")
 _LASTS_S = LIMITS.add("shortest time of it", 5.0, "s", "a choice: a descent through its own wash is over sooner")
+_CLIMB_MS = LIMITS.add("climb off the barometer's", 2.0, "m/s", "more than LAND_SPEED: it lands as it means to hold")
+_CLIMB_LASTS_S = LIMITS.add("shortest time of it", 3.0, "s", "a choice: a gust on the static port is over sooner")
 _GRAVITY = LIMITS.add("gravity", GRAVITY, "m/s^2", "physics")
 _OFF = LIMITS.add("gravity off, at rest", 0.5, "m/s^2", "a choice: a calibrated accelerometer is within 0.1")
 _FAR_OFF = LIMITS.add("gravity far off, at rest", 1.0, "m/s^2", "MPU-6000, not calibrated: 0.8 on one axis")
@@ -36,7 +39,7 @@ _SOURCES = (("EK3_SRC1_POSZ", 1.0), ("EK3_ALT_SOURCE", 0.0), ("EK2_ALT_SOURCE", 
 """The value with which the height is that of the barometer."""
 _HELD = frozenset(("hold", "mission", "return", "land", "guided"))
 _ALT_HOLD = 2
-_FIX = 3
+_FIX, _CM = 3, 0.01
 _FEWEST, _STANDS = 20, 0.2
 """A clock that stands still for so many records tells of no two heights when they were measured."""
 
@@ -46,15 +49,66 @@ def find(flight: Flight) -> Iterator[Finding]:
     heard = flight.barometer
     if not flight.is_copter or heard is None or not flight.armed or not _is_by_barometer(flight):
         return
-    for estimate in (flight.estimated_height, flight.controlled_height):
-        found = None if estimate is None else _parted(flight, estimate, heard)
-        if found is not None:
-            yield found
-            return
-    yield from _not_gravity(flight)
+    estimates = (one for one in (flight.estimated_height, flight.controlled_height) if one is not None)
+    found = next(filter(None, (_parted(flight, one, heard) for one in estimates)), None)
+    climbs = _climb_parted(flight, heard)
+    if (parted := climbs or found) is not None:
+        yield parted
+    if found is None or climbs is not None:
+        yield from _not_gravity(flight, is_critical=climbs is not None)
 
 
-def _not_gravity(flight: Flight) -> Iterator[Finding]:
+def _climb_parted(flight: Flight, heard: tuple[Floats, Floats]) -> Finding | None:
+    """A climb rate that the barometer contradicts while a mode holds the height by it: the vehicle climbs or sinks as
+    fast as that is off."""
+    table = flight.one("CTUN", "CRt")
+    if (
+        table is None
+        or len(table) < _FEWEST
+        or not flight.airborne
+        or any(np.mean(np.diff(one) <= 0.0) > _STANDS for one in (table.t, heard[0]))
+    ):
+        return None
+    t, half = table.t, _CLIMB_LASTS_S / 2
+    rises = (np.interp(t + half, *heard) - np.interp(t - half, *heard)) / _CLIMB_LASTS_S
+    apart = smooth(t, table["CRt"] * _CM, _CLIMB_LASTS_S) - rises
+    spans = lasting(t, (np.abs(apart) > _CLIMB_MS) & flight.watch(t) & _holds_at(flight, t), _CLIMB_LASTS_S)
+    if not spans:
+        return None
+    inside = during(spans, t)
+    said, rose = float(median((apart + rises)[inside])), float(median(rises[inside]))
+    received = _received_climb(flight, spans[0])
+    if received is not None and abs(received - said) < abs(received - rose):
+        return None
+    return Finding(
+        kind="estimator",
+        title="the estimated climb rate runs away from the barometer's",
+        onset_s=spans[0][0],
+        end_s=spans[-1][1],
+        severity="critical",
+        evidence=f"the estimate says {said:+.1f} m/s and the barometer {rose:+.1f} m/s (limit {_CLIMB_MS:g} m/s apart) "
+        f"for {seconds_in(spans):.0f} s in a mode that holds the height{_at_rest(flight)}",
+        source="CTUN.CRt against CTUN.BAlt or BARO.Alt",
+        probability=_TRUE,
+    )
+
+
+def _received_climb(flight: Flight, span: Span) -> float | None:
+    """How fast the receiver's height rises meanwhile, m/s; None where it has no fix."""
+    received = flight.one("GPS", "Alt", "Status")
+    part = None if received is None else received.where(during((span,), received.t) & (received["Status"] >= _FIX))
+    if part is None or len(part) < 3 or part.t[-1] <= part.t[0]:
+        return None
+    return float(np.polyfit(part.t, part["Alt"], 1)[0])
+
+
+def _holds_at(flight: Flight, t: Floats) -> Bools:
+    """Where a mode that goes by the height is in force."""
+    numbers = [mode.number for mode in flight.modes if mode.number is not None and _goes_by_height(mode)]
+    return np.isin(flight.modes_at(t), numbers)
+
+
+def _not_gravity(flight: Flight, *, is_critical: bool) -> Iterator[Finding]:
     """Accelerometers that are far off gravity at rest: every climb rate that is estimated from them is wrong, though
     the barometer holds the height within its limit. Where one of several feels it, the others disagree with that."""
     felt = _felt_at_rest(flight)
@@ -64,12 +118,12 @@ def _not_gravity(flight: Flight) -> Iterator[Finding]:
             title="the accelerometers do not feel gravity at rest",
             onset_s=flight.armed[0][0],
             end_s=flight.end_s,
-            severity="warning",
+            severity="critical" if is_critical else "warning",
             evidence=f"{felt[0]:.1f} m/s^2 before take-off, gravity is {_GRAVITY:g} (limit {_FAR_OFF:g} off): "
             "calibrate them",
             source="IMU.AccX, AccY, AccZ before the throttle is raised",
             probability=_TRUE,
-            mission_lost=_LOST,
+            mission_lost=None if is_critical else _LOST,
         )
 
 
@@ -121,7 +175,11 @@ def _receiver_agrees(
 
 def _holds_height(flight: Flight, start: float, end: float) -> bool:
     """Whether a mode that goes by the height was in force meanwhile."""
-    return any(mode.way in _HELD or mode.number == _ALT_HOLD for mode in flight.modes_between(start, end))
+    return any(map(_goes_by_height, flight.modes_between(start, end)))
+
+
+def _goes_by_height(mode: Mode) -> bool:
+    return mode.way in _HELD or mode.number == _ALT_HOLD
 
 
 def _at_rest(flight: Flight) -> str:
