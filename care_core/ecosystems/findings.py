@@ -153,7 +153,8 @@ NO_POSITION_FOR = " was asked for, and no position is known"
 """Ends the title of a mode that cannot act; the mode stands before it."""
 NOT_READY = "not ready to fly: "
 """Begins the title of a refusal of PX4; the words of its last check follow."""
-NO_BATTERY = "the battery monitor measures no battery, and its failsafe acted"
+NO_BATTERY = "the battery monitor measures no battery"
+"""Begins the title of its failsafe, which follows."""
 CAME_DOWN = "it came down and could not rise again"
 
 

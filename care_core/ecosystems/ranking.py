@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from care_core.ecosystems.explains import EXPLAINS, REFUSES, Explains
-from care_core.ecosystems.findings import OWN_SUPPLY, UNCHARGED, Finding, FindingKind
+from care_core.ecosystems.findings import NO_BATTERY, OWN_SUPPLY, UNCHARGED, Finding, FindingKind
 from care_core.records import replace
 
 SLACK_S = 1.5
@@ -25,6 +25,8 @@ SYMPTOMS: frozenset[FindingKind] = frozenset(("attitude", "crash", "estimator", 
 """What shows that something is wrong, not what: told after causes of the same weight."""
 ON_GROUND: frozenset[FindingKind] = frozenset(("prearm",))
 """What is seen before anything runs: no chain of events lies between it and its cause."""
+_OF_A_FAILSAFE: frozenset[FindingKind] = frozenset(("battery", "crash", "log"))
+"""What a failsafe that acts for nothing brings about: it lands, wherever that is."""
 GRAVITY = {"critical": 0, "warning": 1, "info": 2}
 
 
@@ -102,7 +104,7 @@ def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
         and not any(one.severity == "info" and one.suspect in ("parameter", "operation") for one in (root, finding))
         and finding.kind in reach.get(root.kind, frozenset())
         and _may_refuse(root, finding)
-        and not (root.title == UNCHARGED and _needs_no_full_pack(finding))
+        and not (root.kind == "battery" and _needs_no_pack(root, finding))
         and root.onset_s <= finding.onset_s + SLACK_S
         and root.end_s >= finding.onset_s - OVER_S
         and (finding.probability < LIKELY or (root.probability >= LIKELY and not _only_set(root, finding)))
@@ -124,9 +126,15 @@ def _brought_down(finding: Finding) -> bool:
     return any(one.kind in ("attitude", "crash") for one in finding.consequences)
 
 
-def _needs_no_full_pack(finding: Finding) -> bool:
-    """Whether a pack that was not charged is no reason of it: of one motor among several, or of a supply of 5 V."""
-    return finding.kind == "motor" or finding.title.startswith(OWN_SUPPLY)
+def _needs_no_pack(battery: Finding, finding: Finding) -> bool:
+    """Whether a battery is no reason of it. A pack makes no inertial sensor wrong, unless the autopilot's own supply
+    fails with it; one that was not charged weakens not one motor among several, nor a supply of 5 V; and of a monitor
+    that measures none only the failsafe acts."""
+    if battery.title.startswith(NO_BATTERY):
+        return finding.kind not in _OF_A_FAILSAFE
+    is_one_of_several = finding.kind == "motor" or finding.title.startswith(OWN_SUPPLY)
+    of_sensor = finding.kind == "imu" and not battery.title.startswith(OWN_SUPPLY)
+    return of_sensor or (battery.title == UNCHARGED and is_one_of_several)
 
 
 def _may_refuse(cause: Finding, finding: Finding) -> bool:

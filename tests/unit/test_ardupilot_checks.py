@@ -534,7 +534,11 @@ def test_a_failsafe_of_a_monitor_that_measures_nothing_blames_no_threshold() -> 
     made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
     made.table["BAT"]["Volt"][:] = 3.248
     finding = first(made)
-    assert (finding.title, finding.parameters) == (NO_BATTERY, ())
+    assert (finding.title, finding.parameters) == (f"{NO_BATTERY}, and its failsafe acted", ())
+    made.settings["BATT_FS_LOW_ACT"] = 0.0
+    assert first(made).title == f"{NO_BATTERY}, and its failsafe was told"
+    made.rows["MODE"].append((40.2, {"ModeNum": 9.0}))
+    assert first(made).title == f"{NO_BATTERY}, and its failsafe acted"
 
 
 def test_of_a_battery_that_was_not_full_it_is_none() -> None:

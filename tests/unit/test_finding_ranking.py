@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.ecosystems.explains import Explains
-from care_core.ecosystems.findings import UNCHARGED, Finding, FindingKind, Severity
+from care_core.ecosystems.findings import NO_BATTERY, OWN_SUPPLY, UNCHARGED, Finding, FindingKind, Severity
 from care_core.ecosystems.ranking import OVER_S, SLACK_S, lost_by, rank_findings
 from care_core.records import replace
 from care_core.report.health import finding_lines
@@ -148,3 +148,11 @@ def test_a_pack_that_was_not_charged_weakens_no_single_motor() -> None:
     roots = rank_findings([empty, motor, weak])
     assert "motor" not in [one.kind for root in roots if root.kind == "battery" for one in root.below]
     assert "motor" in [root.kind for root in roots]
+
+
+def test_a_battery_makes_no_inertial_sensor_wrong_and_a_monitor_loads_no_processor() -> None:
+    for title, kind in ((UNCHARGED, "imu"), (NO_BATTERY, "cpu"), (NO_BATTERY, "motor")):
+        battery = replace(finding("battery", 1.0), title=title)
+        assert len(rank_findings([battery, finding(kind, 5.0, "warning")])) == 2
+    supply = replace(finding("battery", 1.0), title=f"{OWN_SUPPLY} dips")
+    assert len(rank_findings([supply, finding("attitude", 3.0), finding("imu", 5.0, "warning")])) == 1

@@ -34,6 +34,7 @@ FULL = LIMITS.add("cell at rest, full", CHARGED_V, "V", _CELLS)
 LOW = LIMITS.add("usual low level of a cell", LOW_V, "V", _ADVICE)
 CRITICAL = LIMITS.add("critical level of a cell", CRITICAL_V, "V", _ADVICE)
 RUINOUS = LIMITS.add("level that harms a cell", HARMED_V, "V", _CELLS)
+_ACTS_S = LIMITS.add("time in which a failsafe acts", 2.0, "s", "a choice: it acts at once, telemetry is late")
 _LASTS_S = LIMITS.add("shortest sag", 2.0, "s", "a choice: a burst of throttle is over sooner")
 _EARLY_V = LIMITS.add("failsafe above the usual low level by", 0.05, "V", "a choice: voltages are set to a tenth")
 _DRAWS_A = LIMITS.add("current that is drawn", 0.5, "A", "a choice: monitors are off by less")
@@ -171,7 +172,7 @@ def _of_no_battery(flight: Flight, table: Table) -> Finding | None:
         return None
     return Finding(
         kind="battery",
-        title=NO_BATTERY,
+        title=f"{NO_BATTERY}, and its failsafe {'acted' if _acted(flight, failsafe) else 'was told'}",
         onset_s=failsafe,
         end_s=flight.end_s,
         severity="critical",
@@ -180,6 +181,16 @@ def _of_no_battery(flight: Flight, table: Table) -> Finding | None:
         source="BAT.Volt; battery failsafe",
         probability=_NOTHING,
     )
+
+
+def _acted(flight: Flight, failsafe: float) -> bool:
+    """Whether a failsafe did anything: it was set to, or the mode or the arming changed with it."""
+    changes = [
+        *(mode.start_s for mode in flight.modes),
+        *(one.time_s for one in flight.arm_changes if not one.is_armed),
+    ]
+    is_set = flight.setting("BATT_FS_LOW_ACT", "FS_BATT_ENABLE") != 0
+    return is_set or any(failsafe <= t <= failsafe + _ACTS_S for t in changes)
 
 
 def _and_failsafe(failsafe: float | None) -> str:
