@@ -321,6 +321,36 @@ def test_records_that_waited_for_the_link_are_timed_by_the_receiver(pace: float,
     assert ("jumps" in " ".join(one.title for one in made.find())) is jumps
 
 
+def test_of_several_jumps_the_first_is_named_and_the_largest_told_with_its_time() -> None:
+    made = Made()
+    for at, metres in ((50.0, 20.0), (70.0, 60.0)):
+        made.table["GPS"]["Lat"][made.after(at)] += metres / 111319.5
+    finding = next(one for one in made.find() if one.kind == "gps")
+    assert (finding.title, finding.onset_s) == ("the GPS position jumps by 20 m", pytest.approx(50.0, abs=0.2))
+    assert "2 jumps, the largest of 60." in finding.evidence
+    made.rows["ERR"] = [(47.0, {"Subsys": 11.0, "ECode": 2.0}), (55.0, {"Subsys": 11.0, "ECode": 0.0})]
+    assert next(one for one in made.find() if one.kind == "gps").onset_s == 47.0  # its glitch began earlier
+
+
+@pytest.mark.parametrize(("leaps_s", "kinds"), [(0.5, ["gps"]), (40.0, ["barometer"])])
+def test_a_height_of_the_receiver_that_leaps_is_no_drift_of_the_barometer(leaps_s: float, kinds: list[str]) -> None:
+    made = Made()
+    made.table["GPS"]["Alt"] += np.interp(made.t, [45.0, 45.0 + leaps_s], [0.0, 100.0])
+    found = list(every_finding(made.find()))
+    assert [one.kind for one in found] == kinds
+    assert ("the GPS height leaps" in [one.title for one in found]) == (kinds == ["gps"])
+
+
+def test_a_rover_that_another_controller_drives_loses_its_fix_on_the_way() -> None:
+    made = Made()
+    made.facts = {"firmware": "ArduRover V4.3.0", "vehicle": "rover"}
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.table["GPS"]["Status"][made.after(70.0, 80.0)] = 1.0
+    assert "the GPS fix was lost on the way" in [one.title for one in every_finding(made.find())]
+    made.table["GPS"]["Spd"][:] = 0.3
+    assert "the GPS fix was lost on the way" not in [one.title for one in every_finding(made.find())]
+
+
 def test_few_satellites() -> None:
     made = Made()
     made.table["GPS"]["NSats"][made.after(FAILS_S)] = 5

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.gps import glitches, height_leaps
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import (
     aligned,
@@ -24,7 +25,7 @@ from care_core.ecosystems.ardupilot.statistics import (
 )
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
-from care_core.ecosystems.spans import inside
+from care_core.ecosystems.spans import during, inside
 from care_core.ecosystems.vehicles import flies
 from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted
@@ -55,6 +56,7 @@ _LOW_M = LIMITS.add("range at which it is compared", 3.0, "m", "a choice: higher
 _BEGAN_M = LIMITS.add("distance from the start at which it is compared", 10.0, "m", "a choice: the same terrain")
 _NO_RANGE_M = LIMITS.add("least range", 0.02, "m", "a choice: range finders say 0 where they see nothing")
 _GOOD_SATS = LIMITS.add("satellites of a height to compare with", 8, "", "a choice: two more than the estimator wants")
+_BEFORE_LEAP_S = LIMITS.add("time before a leap of the GPS height", 5.0, "s", "a choice: it drifts off before")
 _CALIBRATION = calibrated(
     LIMITS, ((1.0, 0.8), (2.0, 0.97)), "only training flights with a failing barometer exceed a limit (17 of 17)"
 )
@@ -210,7 +212,7 @@ def _drift(flight: Flight, first: Table) -> Floats | None:
     gps = flight.one("GPS", "Status", "Alt", "NSats")
     if gps is None:
         return None
-    live = flight.watch(gps.t) & ~inside(flight.repeats("GPS"), gps.t)
+    live = flight.watch(gps.t) & ~inside(flight.repeats("GPS"), gps.t) & ~_is_led_astray(flight, gps.t)
     good = gps.where((gps["Status"] >= _FIX) & (gps["NSats"] >= _GOOD_SATS) & live)
     if len(good) < _COMPARED:
         return None
@@ -219,6 +221,12 @@ def _drift(flight: Flight, first: Table) -> Floats | None:
     apart = np.where(np.abs(nearest - first.t) < _NEAR_S, apart, np.nan)
     zero = apart[np.isfinite(apart)][: max(len(apart) // _AT_FIRST, 3)]
     return smooth(first.t, np.nan_to_num(apart - median(zero)), _AVERAGED_S) if len(zero) else None
+
+
+def _is_led_astray(flight: Flight, t: Floats) -> Bools:
+    """Where the receiver's height tells nothing: in a glitch, and once it leapt."""
+    leaps, _ = height_leaps(flight)
+    return during(glitches(flight), t) | (t >= float(np.min(leaps, initial=np.inf)) - _BEFORE_LEAP_S)
 
 
 def _severity(flight: Flight, start: float, over: float) -> Severity:

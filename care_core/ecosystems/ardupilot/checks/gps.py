@@ -8,6 +8,7 @@ largest jump of 97.5 % of the healthy training flights is 0.4 m.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -16,15 +17,16 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
-from care_core.ecosystems.spans import during, inside, seconds_in, within
+from care_core.ecosystems.spans import Span, during, inside, seconds_in, within
 from care_core.ecosystems.vehicles import flies
 from care_core.ecosystems.vehicles.errors import GPS, GPS_GLITCH
 from care_core.geodesy import METRES_PER_DEGREE, offset_m
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, quantile
+from care_core.text import log_time
 
 READS: Wanted = {
-    "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Spd", "GCrs", "GMS"),
+    "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Alt", "Spd", "GCrs", "GMS"),
     "GPA": ("HAcc", "SAcc"),
     "XKF4": ("SP", "SV"),
 }
@@ -32,6 +34,11 @@ READS: Wanted = {
 LIMITS = Limits()
 JUMP_M = LIMITS.add("jump that the velocity does not explain", 5.0, "m", "AP_GPS_Glitch: GPSGLITCH_RADIUS")
 ACCELERATION = LIMITS.add("acceleration that explains more", 10.0, "m/s^2", "AP_GPS_Glitch: GPSGLITCH_ACCEL")
+_AGAIN_S = LIMITS.add("pause between two reports of one glitch", 5.0, "s", "a choice: it comes and goes")
+_LEAPS_S, _LEAP_M = (
+    LIMITS.add("time of a leap of its height", 2.0, "s", "a choice: two fixes of a slow receiver"),
+    LIMITS.add("leap of its height off the barometer's", 15.0, "m", "a choice: heights wander by metres in minutes"),
+)
 _TIMES_USUAL = LIMITS.add("jump over the usual ones", 5.0, "", "a choice: a velocity that never fits tells nothing")
 _LARGE = LIMITS.add("critical jump, in limits", 3.0, "", "a choice: the vehicle follows it")
 _SPEED_MS = LIMITS.add("speed that explains a step", 1.0, "m/s", "a choice: one at rest has a speed, too")
@@ -65,9 +72,14 @@ _LOST = LIMITS.add(
     "probability that few satellites cost the mission", 0.15, "",
     "4 of 11 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
 )  # fmt: skip
+_DRIVES_MS, _DRIVES_S = (
+    LIMITS.add("speed that drives", 1.5, "m/s", "a choice: a receiver's speed wanders by less as it stands"),
+    LIMITS.add("time of it", 5.0, "s", "a choice: longer than a receiver finds its fix"),
+)
 _DRIVES = LIMITS.add("throttle that drives", 0.02, "", "a choice: what idles has less")
 _NO_FIX = LIMITS.add("probability of a lost fix", 0.9, "", "the receiver's own word")
 _GLITCHED = LIMITS.add("probability of a reported glitch", 0.6, "", "a choice: the firmware's word, without the size")
+_LEAPT = LIMITS.add("probability of a receiver whose height leaps", 0.8, "", "a choice: nothing flies so")
 _DOUBTS = LIMITS.add("probability where it is only inaccurate", 0.4, "", "a choice: buildings and trees do that")
 
 
@@ -80,6 +92,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     own = table.where(flight.watch(table.t) & ~inside(flight.repeats("GPS"), table.t))
     jumped = list(_jumps(flight, own))
     yield from jumped
+    yield from _leaps(flight)
     if not jumped:
         yield from _reported(flight)
     lost = list(_lost(flight, own))
@@ -113,22 +126,75 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     beyond = np.flatnonzero((off > limit) & (dt < _STEP_S) & (dt > 0.01) & ~late)
     if not len(beyond):
         return
-    start, size = float(t[1:][beyond[0]]), float(off[beyond].max())
+    start, size, largest = float(t[1:][beyond[0]]), float(off[beyond[0]]), int(beyond[np.argmax(off[beyond])])
     over = float((off / limit)[beyond].max())
     estimate = "; the estimator's position innovation is over its limit" if _upset(flight, start) else ""
+    glitch_s = _glitched_before(flight, start)
+    at = f", the largest of {off[largest]:.1f} m at {log_time(float(t[1:][largest]))}," if largest != beyond[0] else ""
     yield Finding(
         kind="gps",
         title=f"the GPS position jumps by {size:.0f} m",
-        onset_s=start,
+        onset_s=start if glitch_s is None else glitch_s,
         end_s=float(t[1:][beyond[-1]]),
-        severity=_severity(flight, start, size > _LARGE * JUMP_M or bool(estimate)),
+        severity=_severity(flight, start, off[largest] > _LARGE * JUMP_M or bool(estimate)),
         evidence=(
-            f"{len(beyond)} jump{'s' * (len(beyond) > 1)} of up to {size:.1f} m that its own velocity does not explain "
-            f"(limit {JUMP_M:g} m and 10 m/s^2){estimate}"
+            f"{len(beyond)} jump{'s' * (len(beyond) > 1)}{at or f' of {size:.1f} m'} that its own velocity does not "
+            f"explain (limit {JUMP_M:g} m and 10 m/s^2){estimate}"
+            + ("" if glitch_s is None else f"; the firmware reports a glitch from {log_time(glitch_s)} on")
         ),
         source="GPS.Lat, Lng against Spd and GCrs; GPSGLITCH_RADIUS 5 m, GPSGLITCH_ACCEL 10 m/s^2 of ArduPilot",
         probability=calibrated_probability(over, _JUMP),
     )
+
+
+def glitches(flight: Flight) -> list[Span]:
+    """When the firmware reports a glitch, until it says that it is over; those that follow each other are one."""
+    spans: list[Span] = []
+    for t, code in flight.errors(GPS):
+        if code == GPS_GLITCH and spans and t - spans[-1][1] < _AGAIN_S:
+            spans[-1] = (spans[-1][0], math.inf)
+        elif code == GPS_GLITCH:
+            spans.append((t, math.inf))
+        elif spans and not math.isfinite(spans[-1][1]):
+            spans[-1] = (spans[-1][0], t)
+    return spans
+
+
+def _glitched_before(flight: Flight, start: float) -> float | None:
+    """When the glitch began in which a jump lies; None where the firmware reports none."""
+    begun = (a for a, b in glitches(flight) if a <= start <= b + _AGAIN_S and within(flight.watched, a))
+    return next(begun, None)
+
+
+def height_leaps(flight: Flight) -> tuple[Floats, Floats]:
+    """When the receiver's height leaps while the barometer's does not, and by how much, m."""
+    received, heard = flight.one("GPS", "Alt", "Status"), flight.barometer
+    if received is None or heard is None:
+        return np.empty(0), np.empty(0)
+    fixed = received.where((received["Status"] >= _FIX) & flight.watch(received.t))
+    if len(fixed) < 3:
+        return np.empty(0), np.empty(0)
+    t, height = fixed.t, fixed["Alt"]
+    earlier = np.searchsorted(t, t - _LEAPS_S)
+    rose, climbed = height - height[earlier], np.interp(t, *heard) - np.interp(t[earlier], *heard)
+    leaps = (np.abs(rose - climbed) > _LEAP_M) & (np.abs(rose) > 2 * np.abs(climbed)) & (t - t[earlier] > _LEAPS_S / 2)
+    return t[leaps], np.abs(rose - climbed)[leaps]
+
+
+def _leaps(flight: Flight) -> Iterator[Finding]:
+    """A height of the receiver that leaps as no vehicle does: whatever differs from it does not drift."""
+    t, by_m = height_leaps(flight)
+    if len(t):
+        yield Finding(
+            kind="gps",
+            title="the GPS height leaps",
+            onset_s=float(t[0]),
+            end_s=float(t[-1]),
+            severity="warning",
+            evidence=f"by up to {np.max(by_m):.0f} m in {_LEAPS_S:g} s against the barometer (limit {_LEAP_M:g} m)",
+            source="GPS.Alt against BARO.Alt or CTUN.BAlt",
+            probability=_LEAPT,
+        )
 
 
 def _is_late(table: Table) -> Bools:
@@ -221,11 +287,18 @@ def _started(flight: Flight, table: Table) -> Table:
 
 
 def _drove(flight: Flight) -> bool:
-    """Whether its throttle ever left its middle while it was armed; where none is recorded, it may have."""
+    """Whether its throttle ever left its middle while it was armed, or its receiver tells of driving by other means;
+    where no throttle is recorded, it may have."""
     if flight.throttle is None:
         return True
     t, throttle = flight.throttle
-    return bool(np.any(np.abs(throttle[during(flight.armed, t)]) > _DRIVES))
+    if np.any(np.abs(throttle[during(flight.armed, t)]) > _DRIVES):
+        return True
+    moved = flight.one("GPS", "Spd", "Status", "NSats")
+    if moved is None:
+        return False
+    sure = (moved["Status"] >= _FIX) & (moved["NSats"] >= FEWEST) & during(flight.armed, moved.t)
+    return bool(lasting(moved.t, sure & (moved["Spd"] > _DRIVES_MS), _DRIVES_S))
 
 
 def _few(flight: Flight, table: Table) -> Iterator[Finding]:
