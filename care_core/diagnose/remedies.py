@@ -54,6 +54,11 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         "mount the autopilot on softer foam, and look for what strikes or shakes the frame",
     ),
     (
+        "the gyro is offset",
+        "let it stand still while it starts, so that it calibrates its gyros; replace it if they still turn at rest",
+    ),
+    ("the accelerometers do not feel gravity", "calibrate the accelerometers, and replace the autopilot if that fails"),
+    (
         r"only \d+ satellites|poor satellite geometry",
         "wait under open sky for more satellites before arming, and look at the GPS antenna if they do not come",
     ),

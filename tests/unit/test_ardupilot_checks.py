@@ -522,6 +522,38 @@ def test_noisy_gyros_are_told_from_an_oscillation(rate_hz: float) -> None:
     assert not [one for one in swinging.find() if one.kind == "imu"]
 
 
+def offset_gyro(made: Made, dps: float) -> None:
+    for table in ("IMU", "IMU#2"):
+        made.table[table]["GyrX"] += np.radians(dps)
+
+
+@pytest.mark.parametrize(("dps", "is_told"), [(8.0, True), (1.0, False)])
+def test_a_gyro_that_turns_at_rest_while_gravity_stays_is_offset(dps: float, is_told: bool) -> None:
+    made = Made()
+    made.table["CTUN"]["ThO"][made.t < UP_S] = 0.0
+    offset_gyro(made, dps)
+    assert ("the gyro is offset at rest" in [one.title for one in made.find()]) is is_told
+
+
+def test_what_is_turned_about_the_vertical_as_it_stands_has_no_offset_gyro() -> None:
+    made = Made()
+    made.table["CTUN"]["ThO"][made.t < UP_S] = 0.0
+    for table in ("IMU", "IMU#2"):
+        made.table[table]["GyrZ"] += np.radians(20.0)
+    assert "the gyro is offset at rest" not in [one.title for one in made.find()]
+
+
+def test_control_was_not_lost_where_gravity_contradicts_the_attitude_at_rest() -> None:
+    made = Made()
+    made.table["CTUN"]["ThO"][(made.t < UP_S) | (made.t > DOWN_S)] = 0.0
+    offset_gyro(made, 8.0)
+    made.table["ATT"]["Roll"] = np.interp(made.t, [0.0, 20.0, END_S], [20.0, 50.0, 60.0])
+    assert made.flight().lost_control_s is not None
+    titles = [one.title for one in every_finding(made.find())]
+    assert "the gyro is offset at rest" in titles
+    assert "control was lost" not in titles
+
+
 def test_a_failed_gyro() -> None:
     made = Made()
     made.table["IMU"]["GH"][made.after(FAILS_S)] = 0

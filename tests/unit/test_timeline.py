@@ -266,3 +266,10 @@ def test_a_failsafe_of_the_heartbeat_alone_is_told() -> None:
     assert texts(told({"STAT": beats}), "arming") == ["armed: the log records no arming, by its status"]
     spoken = told({"STAT": beats, "MSG": said((22.0, "Battery Failsafe"))})
     assert texts(spoken, "failsafe") == ["Battery Failsafe"]
+
+
+def test_the_highest_point_of_an_estimate_that_runs_away_is_the_barometers() -> None:
+    t = np.arange(0.0, 100.0, 0.1)
+    heard = np.interp(t, [12, 15, 55, 58], [0.0, 3.0, 3.0, 0.0])
+    controls = Table(t, {"ThO": np.where((t > 12) & (t < 58), 0.4, 0.0), "Alt": heard + 2.0 * t, "BAlt": heard})
+    assert texts(told({"ARM": ARMED, "CTUN": controls}), "flight") == ["highest point, 3.0 m"]

@@ -41,6 +41,7 @@ from care_core.ecosystems.vehicles import (
 )
 from care_core.ecosystems.vehicles.errors import EKF_PRIMARY, TERRAIN
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import Floats
 from care_core.text import listed, log_time, times_until
 
 READS: Wanted = {
@@ -286,11 +287,19 @@ def _flown(flight: Flight) -> Iterator[Event]:
 
 
 def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | None:
-    """When a vehicle that flies was highest while armed, and how high: where it stayed for a second if more is but a
-    spike of its barometer."""
-    known = flight.height
-    if known is None or flight.kind in ("rover", "sub"):
+    """When a vehicle that flies was highest while armed, and how high; by its barometer where its estimate runs away
+    above that."""
+    heights = [flight.height, flight.barometer if flight.is_copter else None]
+    if heights[0] is None or flight.kind in ("rover", "sub"):
         return None
+    estimate, *others = (_highest_of(flight, one, start, end) for one in heights if one is not None)
+    heard = next((one for one in others if one is not None), None)
+    runs_away = estimate is not None and heard is not None and estimate[1] - heard[1] > _SPIKE_M
+    return heard if runs_away else estimate
+
+
+def _highest_of(flight: Flight, known: tuple[Floats, Floats], start: float, end: float) -> tuple[float, float] | None:
+    """Where it stayed for a second if more is but a spike of its barometer."""
     t, height = known
     down_s = end if flight.impact_s is None else max(flight.impact_s, start)  # a barometer drifts on as it lies
     inside = np.flatnonzero((t >= start) & (t <= min(end, down_s)) & np.isfinite(height))

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.airborne import ACRO, UPSIDE_DOWN_DEG
+from care_core.ecosystems.ardupilot.checks.settings import gravity
 from care_core.ecosystems.ardupilot.checks.thrust import saturated
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
 from care_core.ecosystems.ardupilot.statistics import lasting, means, parts, records, top
@@ -118,7 +119,7 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
     error = flight.lean_error
-    if error is None:
+    if error is None or _is_contradicted(flight):
         return
     after = error[1][(error[0] >= lost) & (error[0] <= lost + _AFTER_S)]
     yield Finding(
@@ -130,6 +131,21 @@ def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
         evidence=f"the attitude is up to {float(np.max(after)):.0f} deg off its target and does not recover",
         source="ATT; 30 degrees: ArduCopter's crash check",
         probability=_LOST,
+    )
+
+
+def _is_contradicted(flight: Flight) -> bool:
+    """Whether its gyros turn and gravity tells of another lean than the estimate each time that it rests: what left its
+    demand is the estimate, and nobody knows its attitude."""
+    tilt, rests = flight.tilt, list(gravity.rests(flight))
+    return (
+        tilt is not None
+        and bool(rests)
+        and all(
+            rest.turns_dps > gravity.TURNS_DPS
+            and abs(gravity.lean_deg(rest.down) - float(np.interp(rest.span[1], *tilt))) > FAR_DEG
+            for rest in rests
+        )
     )
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.checks.settings import level
+from care_core.ecosystems.ardupilot.checks.settings import gravity, level
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import (
     aligned,
@@ -38,7 +38,7 @@ READS: Wanted = {
     "XKF1": ("GX", "GY", "GZ"),
 }
 
-LIMITS = Limits()
+LIMITS = Limits(gravity.LIMITS)
 NOISE_DPS = LIMITS.add("noise on the quietest axis", 0.3, "deg/s", "the noisiest healthy training flight has 0.07")
 OFFSET_DPS = LIMITS.add("two gyros apart", 5.0, "deg/s", "AP_Arming: gyros inconsistent")
 OFFSET_ACC = LIMITS.add(
@@ -112,11 +112,13 @@ _PLANE_SHAKEN_DPS = LIMITS.add(
     "a choice: lower than of others, for a plane rolls and pitches all the time",
 )
 _FAILED = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
+_OFFSET = LIMITS.add("probability of a gyro that is offset at rest", 0.9, "", "nothing turns while gravity stays")
 _APART = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
     """What is wrong with the inertial sensors before anything was lost."""
+    yield from _offset(flight)
     lost = math.inf if flight.lost_control_s is None else flight.lost_control_s - _TURNS_OVER_S
     sensors = [table.where(flight.watch(table.t) & (table.t < lost)) for table in flight.all("IMU", *GYROS)]
     sensors = [table for table in sensors if len(table) >= 5]
@@ -146,6 +148,28 @@ def _unhealthy(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
                     source=f"IMU.{flag}",
                     probability=_FAILED,
                 )
+
+
+def _offset(flight: Flight) -> Iterator[Finding]:
+    """A gyro that tells of turning while the vehicle lies still: the attitude is carried away with it. Of a run in
+    which it never rests, the others of its log tell."""
+    rests = list(gravity.rests(flight)) or list(gravity.rests(flight.whole) if flight.armed else ())
+    turning = [rest for rest in rests if rest.turns_dps > gravity.TURNS_DPS]
+    if turning:
+        most = float(median(np.array([rest.turns_dps for rest in turning])))
+        yield Finding(
+            kind="imu",
+            title="the gyro is offset at rest",
+            onset_s=flight.armed[-1][0],
+            end_s=flight.end_s,
+            severity="critical" if flight.lost_control_s is not None or flight.impact_s is not None else "warning",
+            evidence=(
+                f"it turns at {most:.1f} deg/s by its gyro while gravity stays where it is "
+                f"(limit {gravity.TURNS_DPS:g}): calibrate the gyros standing still"
+            ),
+            source="IMU.GyrX, GyrY, GyrZ against AccX, AccY, AccZ with the motors down",
+            probability=_OFFSET,
+        )
 
 
 def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
