@@ -683,6 +683,20 @@ def test_too_little_thrust_and_an_option_that_keeps_it_down() -> None:
     assert first(made).suspect == "parameter"
 
 
+@pytest.mark.parametrize(
+    ("sinks_ms", "throttle", "is_told"), [(1.5, 0.92, True), (1.5, 0.8, False), (0.3, 0.92, False)]
+)
+def test_what_sinks_on_with_nearly_all_its_thrust_lacks_it(sinks_ms: float, throttle: float, is_told: bool) -> None:
+    made = Made()
+    made.rows["MODE"] = [(0.0, {"ModeNum": 0.0})]
+    down = made.after(50.0, 54.0)
+    made.table["CTUN"]["ThO"][down] = throttle
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt")):
+        made.table[name][field] -= sinks_ms * np.clip(made.t - 50.0, 0.0, 4.0)
+    found = [one for one in every_finding(made.find()) if one.title == "too little thrust"]
+    assert [one.severity for one in found] == ["critical"] * is_told
+
+
 def test_a_radio_that_comes_back_at_once_explains_little() -> None:
     made = Made()
     made.rows["ERR"] = [(50.0, {"Subsys": 5.0, "ECode": 1.0}), (50.2, {"Subsys": 5.0, "ECode": 0.0})]

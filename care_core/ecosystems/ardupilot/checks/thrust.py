@@ -16,10 +16,11 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
-from care_core.ecosystems.spans import Span, during, seconds_in
+from care_core.ecosystems.spans import Span, during, runs, seconds_in
 from care_core.ecosystems.vehicles.errors import BATTERY_FAILSAFE
 from care_core.logs.base import Wanted
 from care_core.numbers import median
+from care_core.records import replace
 from care_core.text import log_time
 
 READS: Wanted = {"CTUN": ("ThO", "Alt", "DAlt", "CRt", "DCRt"), "MOTB": ("ThLimit", "LiftMax")}
@@ -29,12 +30,19 @@ HOVER_MOST = LIMITS.add("hover throttle", 0.6875, "", "AP_MotorsMulticopter.h: A
 _LASTS_S = LIMITS.add("shortest hover at a high throttle", 10.0, "s", "a choice: a climb is over sooner")
 _SHARE = LIMITS.add("share of the flight at a high throttle", 0.3, "", "a choice: gusts take less")
 FULL = LIMITS.add("throttle of all that the motors have", 0.95, "", "a choice: MOT_SPIN_MAX as shipped")
+_NEARLY_FULL = LIMITS.add(
+    "throttle of nearly all that they have", 0.9, "", "a choice: a pilot's stick is not at its end"
+)
+_SINKS_MS = LIMITS.add(
+    "sink that goes on with it", 1.0, "m/s", "a choice: what has thrust to spare has stopped by then"
+)
 _FULL_LASTS_S = LIMITS.add("shortest time at full throttle", 3.0, "s", "a choice: a gust is over sooner")
 _BELOW_M = LIMITS.add("height below the one wanted", 2.0, "m", "a choice: height control is within a metre")
 _CLIMBS_MS = LIMITS.add("climb of what has thrust to spare", 1.0, "m/s", "a choice: half of PILOT_SPEED_UP as shipped")
 _GROUNDED_S = LIMITS.add("full throttle on the ground", 5.0, "s", "a choice: a take-off takes less")
 SPIN_MOST = LIMITS.add("MOT_SPIN_MAX that keeps motors down", 0.9, "", "AP_MotorsMulticopter: 0.95 as shipped")
 _FLYING = LIMITS.add("least throttle in the air", 0.05, "", "a choice: above it motors turn")
+_LACKS = LIMITS.add("probability where it sinks with nearly all", 0.7, "", "a choice: its own wash sinks it as well")
 _PROBABILITY: Mapping[SuspectKind, float] = {
     "hardware": LIMITS.add(
         "probability of a weak part", 0.3, "", "7 of 83 such training flights have one, and those vary little in weight"
@@ -58,10 +66,13 @@ def find(flight: Flight) -> Iterator[Finding]:
     spans = lasting(t, flown & (level > HOVER_MOST), _LASTS_S, gap_s=5.0)
     high = [span for span in spans if not climbs(flight, *span)]
     full = [span for span in saturated(flight) if _below(flight, *span) or not climbs(flight, *span)]
-    if full:
-        start = full[0][0]
+    sinking = _sinking(flight)
+    if strained := full or sinking:
+        start = strained[0][0]
+        begin = min([start, *[a for a, _ in high]])
         before = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
-        yield _too_little(flight, full, min([start, *[a for a, _ in high]]), before)
+        found = _too_little(flight, strained, begin, before, FULL if full else _NEARLY_FULL, sinking)
+        yield replace(found, probability=max(found.probability, _LACKS)) if sinking else found
     elif high and seconds_in(high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
         share = 100 * float(median(level[flown]))
         evidence = f"mean throttle {share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %)"
@@ -69,24 +80,26 @@ def find(flight: Flight) -> Iterator[Finding]:
         yield _finding(flight, title, (high[0][0], high[-1][1]), "warning", evidence)
 
 
-def _too_little(flight: Flight, full: list[Span], begin: float, before: float) -> Finding:
+def _too_little(
+    flight: Flight, strained: list[Span], begin: float, before: float, least: float, sinking: list[Span]
+) -> Finding:
     """The motors give all that they have.
 
     Args:
-        full: when they do. begin: when the throttle first was high. before: the throttle until then.
+        strained: when they do. begin: when the throttle first was high. before: the throttle until then.
+        least: the throttle above which that is. sinking: when it sank all the same.
     """
-    start, end = full[0][0], full[-1][1]
-    below, lasted = _below(flight, start, end), seconds_in(full)
+    start, end = strained[0][0], strained[-1][1]
+    below, lasted = _below(flight, start, end), seconds_in(strained)
     grounded = not flight.flown and lasted > _GROUNDED_S
     lost = flight.impact_s is not None or any(code for _, code in flight.errors(BATTERY_FAILSAFE))
     since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""
-    evidence = f"throttle above {since}{100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
+    evidence = f"throttle above {since}{100 * least:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
     evidence += f", {below:.1f} m below the height wanted" if below else ""
+    evidence += f", and it sank by {_sank_m(flight, *sinking[0]):.1f} m at that" if sinking else ""
     evidence += f"; {100 * before:.0f} % before that"
-    severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
-    return _finding(
-        flight, "too little thrust", (begin, end), severity, f"{evidence}; {100 * before:.0f} % before that"
-    )
+    is_grave = grounded or lost or bool(sinking) or below > 2 * _BELOW_M
+    return _finding(flight, "too little thrust", (begin, end), "critical" if is_grave else "warning", evidence)
 
 
 def _finding(flight: Flight, title: str, span: Span, severity: Severity, evidence: str) -> Finding:
@@ -114,6 +127,26 @@ def saturated(flight: Flight) -> list[Span]:
     t, throttle = driven
     flown = during(flight.flown or flight.watched, t)
     return lasting(t, flown & (throttle > FULL), _FULL_LASTS_S, gap_s=1.0)
+
+
+def _sinking(flight: Flight) -> list[Span]:
+    """When it sinks on with nearly all that its motors have: a descent that began before would end at that."""
+    driven, known = flight.throttle, flight.height
+    if driven is None or known is None:
+        return []
+    t, throttle = driven
+    spans = []
+    for start, end in runs(t, (throttle > _NEARLY_FULL) & during(flight.watched, t)):
+        at = t[(t >= start + _FULL_LASTS_S) & (t <= end)]
+        sank = np.interp(at - _FULL_LASTS_S, *known) - np.interp(at, *known) > _BELOW_M
+        sinks = np.interp(at - 1.0, *known) - np.interp(at, *known) > _SINKS_MS
+        spans += [(a - _FULL_LASTS_S, b) for a, b in runs(at, sank & sinks, gap_s=_FULL_LASTS_S)]
+    return spans
+
+
+def _sank_m(flight: Flight, start: float, end: float) -> float:
+    assert flight.height is not None
+    return float(np.interp(start, *flight.height) - np.interp(end, *flight.height))
 
 
 class _Behind(NamedTuple):
