@@ -697,6 +697,16 @@ def test_what_sinks_on_with_nearly_all_its_thrust_lacks_it(sinks_ms: float, thro
     assert [one.severity for one in found] == ["critical"] * is_told
 
 
+@pytest.mark.parametrize("is_cleared", [True, False])
+def test_an_estimator_check_that_fails_on_the_ground_and_is_never_cleared_is_told(is_cleared: bool) -> None:
+    made = Made()
+    made.rows["ERR"] = [(ARMED_S + 1.0, {"Subsys": 16.0, "ECode": 2.0})]
+    if is_cleared:
+        made.rows["ERR"].append((ARMED_S + 2.0, {"Subsys": 16.0, "ECode": 0.0}))
+    found = [one for one in every_finding(made.find()) if one.kind == "estimator"]
+    assert [one.severity for one in found] == ["warning"] * (not is_cleared)
+
+
 def test_a_radio_that_comes_back_at_once_explains_little() -> None:
     made = Made()
     made.rows["ERR"] = [(50.0, {"Subsys": 5.0, "ECode": 1.0}), (50.2, {"Subsys": 5.0, "ECode": 0.0})]

@@ -16,7 +16,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.spans import during, within
+from care_core.ecosystems.spans import Span, during, within
 from care_core.ecosystems.vehicles.errors import EKF_CHECK, EKF_FAILSAFE
 from care_core.logs.base import Wanted
 from care_core.text import log_time
@@ -29,6 +29,8 @@ _LASTS_S = LIMITS.add("shortest rejection", 2.0, "s", "a choice: single outliers
 _REJECTED = LIMITS.add("probability that the estimator is at fault", 0.2, "", "a choice: mostly its sensors are")
 _SWITCHED = LIMITS.add("probability of a changed lane", 0.3, "", "a choice: it switches to the better sensor")
 _BOOTED = LIMITS.add("probability of ARMING_REQUIRE", 0.9, "", "it is all over once there is a position")
+_STANDS_S = LIMITS.add("shortest check that is not cleared", 5.0, "s", "a choice: disarming ends it as well")
+_TITLE = "the estimator rejects its measurements"
 _WORDS = {"SV": "velocity", "SP": "position", "SH": "height", "SM": "magnetic field"}
 _NEEDS_NO_ARMING = "ARMING_REQUIRE"
 _LANE = re.compile(r"(lane switch|EKF primary changed|switching to (compass|IMU|GPS)|EKF Failsafe|EKF variance)", re.I)
@@ -49,7 +51,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     failed = _inside(flight, [t for t, code in flight.errors(EKF_FAILSAFE) if code])
     failed += _inside(flight, [t for t, code in flight.errors(EKF_CHECK) if code])
     if not worst and not failed:
-        yield from _switched(flight)
+        standing = _not_cleared(flight)
+        yield from _switched(flight) if standing is None else (_stands(*standing),)
     elif not worst and (position_s := _armed_before_position(flight, failed)) is not None:
         yield _armed_too_early(failed[0], position_s)
     else:
@@ -68,6 +71,19 @@ def _rejections(flight: Flight) -> dict[str, _Rejection]:
                 if field not in worst or start < worst[field].start_s:
                     worst[field] = _Rejection(start, end, peak)
     return worst
+
+
+def _stands(start_s: float, end_s: float) -> Finding:
+    return Finding(
+        kind="estimator",
+        title=_TITLE,
+        onset_s=start_s,
+        end_s=end_s,
+        severity="warning",
+        evidence=f"the firmware's EKF check failed at {log_time(start_s)} and was not cleared while it was armed",
+        source=f"ERR {EKF_CHECK}",
+        probability=_REJECTED,
+    )
 
 
 def _switched(flight: Flight) -> Iterator[Finding]:
@@ -112,7 +128,7 @@ def _rejects(worst: Mapping[str, _Rejection], failed: list[float]) -> Finding:
         evidence += f"; EKF check or failsafe at {log_time(min(failed))}"
     return Finding(
         kind="estimator",
-        title="the estimator rejects its measurements",
+        title=_TITLE,
         onset_s=min([one.start_s for one in worst.values()] + failed),
         end_s=max([one.end_s for one in worst.values()] + failed),
         severity="critical" if failed else "warning",
@@ -129,6 +145,16 @@ def _armed_before_position(flight: Flight, failed: list[float]) -> float | None:
         return None
     first = min((t for t, text in flight.messages if _HAS_POSITION.match(text)), default=None)
     return first if first is not None and failed and max(failed) < first else None
+
+
+def _not_cleared(flight: Flight) -> Span | None:
+    """From when the firmware's check failed, on the ground, to the end of that arming, where it said no more of it."""
+    told = flight.errors(EKF_CHECK)
+    for start, end in flight.armed:
+        last = next((one for one in reversed(told) if start <= one[0] <= end), None)
+        if last is not None and last[1] and end - last[0] > _STANDS_S:
+            return last[0], end
+    return None
 
 
 def _inside(flight: Flight, times: list[float]) -> list[float]:
