@@ -273,3 +273,8 @@ def test_the_highest_point_of_an_estimate_that_runs_away_is_the_barometers() -> 
     heard = np.interp(t, [12, 15, 55, 58], [0.0, 3.0, 3.0, 0.0])
     controls = Table(t, {"ThO": np.where((t > 12) & (t < 58), 0.4, 0.0), "Alt": heard + 2.0 * t, "BAlt": heard})
     assert texts(told({"ARM": ARMED, "CTUN": controls}), "flight") == ["highest point, 3.0 m"]
+
+
+def test_texts_of_numbers_alone_are_left_out() -> None:
+    events = told({"MSG": said((1.0, " 0.35 -0.42 -29.93"), (2.0, "GPS Attack Started"), (3.0, "  "))})
+    assert texts(events, "message") == ["GPS Attack Started"]

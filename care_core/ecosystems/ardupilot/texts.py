@@ -39,8 +39,9 @@ RECORDED = {
 
 
 def is_routine(text: str) -> bool:
-    """Whether a text is one of those that every start, arming or mission item brings."""
-    return not text.strip() or _ROUTINE.match(text) is not None
+    """Whether a text is one of those that every start, arming or mission item brings, or says nothing in words: numbers
+    alone are somebody's own debugging."""
+    return not any(map(str.isalpha, text)) or _ROUTINE.match(text) is not None
 
 
 _NUMBERS = re.compile(r"\s*\([^)]*\d[^)]*\)")
