@@ -97,6 +97,8 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
         return _mended(named, findings, run)
     if has_failed and diagnosis.tell_more:
         return diagnosis.tell_more[0]
+    if has_failed and (mended := _of_the_gravest(findings, run)):
+        return mended
     return _without_profile(diagnosis) if diagnosis.profile.fit.verdict == "no" else ""
 
 
@@ -121,6 +123,12 @@ def _mended(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str:
     if untold:
         advice.append(f"look at what this names: {listed(untold)}")
     return "; ".join(dict.fromkeys(advice))
+
+
+def _of_the_gravest(findings: Iterable[Finding], run: Run) -> str:
+    """What to do about the first critical finding, where nothing is likely enough to be named as the cause."""
+    gravest = next((one for one in findings if one.severity == "critical" and not one.after_impact), None)
+    return "" if gravest is None else remedy(gravest, is_robot=_is_robot(run))
 
 
 def _without_profile(diagnosis: Diagnosis) -> str:

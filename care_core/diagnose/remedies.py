@@ -70,6 +70,10 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         "the compass reads nothing",
         "check the compass's cable, and COMPASS_ parameters for values that are not numbers",
     ),
+    (
+        "the estimator rejects its measurements",
+        "find which measurement it rejects: look at GPS, compass, barometer and vibration at that time",
+    ),
     ("barometer and range finder", "lift it to a height that you measure, and see which of the two is wrong"),
     (r"(.*) (?:is|are) at the stop", r"check \1: servo, linkage and horn, free travel, and the load in flight"),
     (

@@ -123,6 +123,13 @@ def test_telemetry_of_a_px4_vehicle_is_no_log_of_it() -> None:
     assert "what each profile would need" in next_step(replace(heard, run=made.run), has_failed=False)
 
 
+def test_a_failed_run_that_no_profile_fits_is_told_what_to_do_about_its_gravest_finding() -> None:
+    estimator = Finding("estimator", "the estimator rejects its measurements", 5.0, 9.0, "critical", "", "")
+    made = replace(failed(estimator), tell_more=())
+    unfit = replace(made, profile=replace(made.profile, fit=replace(made.profile.fit, verdict="no")))
+    assert next_step(unfit, has_failed=True).startswith("find which measurement it rejects")
+
+
 @pytest.mark.parametrize(
     ("why", "told"),
     [(NOT_FLOWN, "in which the vehicle was armed"), (TOO_SHORT, "'care record PROFILE' what to record")],
