@@ -326,7 +326,8 @@ def test_of_several_jumps_the_first_is_named_and_the_largest_told_with_its_time(
     for at, metres in ((50.0, 20.0), (70.0, 60.0)):
         made.table["GPS"]["Lat"][made.after(at)] += metres / 111319.5
     finding = next(one for one in made.find() if one.kind == "gps")
-    assert (finding.title, finding.onset_s) == ("the GPS position jumps by 20 m", pytest.approx(50.0, abs=0.2))
+    assert finding.title == "the GPS position jumps by 20 m"
+    assert finding.onset_s == pytest.approx(50.0, abs=0.2)
     assert "2 jumps, the largest of 60." in finding.evidence
     made.rows["ERR"] = [(47.0, {"Subsys": 11.0, "ECode": 2.0}), (55.0, {"Subsys": 11.0, "ECode": 0.0})]
     assert next(one for one in made.find() if one.kind == "gps").onset_s == 47.0  # its glitch began earlier

@@ -151,7 +151,8 @@ def test_a_pack_that_was_not_charged_weakens_no_single_motor() -> None:
 
 
 def test_a_battery_makes_no_inertial_sensor_wrong_and_a_monitor_loads_no_processor() -> None:
-    for title, kind in ((UNCHARGED, "imu"), (NO_BATTERY, "cpu"), (NO_BATTERY, "motor")):
+    apart: tuple[tuple[str, FindingKind], ...] = ((UNCHARGED, "imu"), (NO_BATTERY, "cpu"), (NO_BATTERY, "motor"))
+    for title, kind in apart:
         battery = replace(finding("battery", 1.0), title=title)
         assert len(rank_findings([battery, finding(kind, 5.0, "warning")])) == 2
     supply = replace(finding("battery", 1.0), title=f"{OWN_SUPPLY} dips")
