@@ -25,7 +25,7 @@ LIMITS = Limits()
 SOON_S = LIMITS.add(
     "time from a change to the upset", 10.0, "s", "a choice: control loops answer within seconds, an integrator in ten"
 )
-_PROBABILITY = LIMITS.add(
+_PROBABILITY_P = LIMITS.add(
     "probability that it did it",
     0.9,
     "",
@@ -124,6 +124,6 @@ def _finding(
         f"({log_time(upset.time_s)}). To put it back: {back}",
         source=source,
         suspect="parameter",
-        probability=_PROBABILITY,
+        probability=_PROBABILITY_P,
         parameters=tuple(names),
     )

@@ -16,7 +16,9 @@ from care_core.run import Setting, shown
 from care_core.text import first_of, listed
 
 LIMITS = Limits()
-_SURE = LIMITS.add("probability of what is not a number", 0.95, "", "whatever is computed with it is no number either")
+_SURE_P = LIMITS.add(
+    "probability of what is not a number", 0.95, "", "whatever is computed with it is no number either"
+)
 _READ_BY: Mapping[FindingKind, re.Pattern[str]] = {
     "compass": re.compile(r"COMPASS_|CAL_MAG"),
     "imu": re.compile(r"INS_|CAL_(GYRO|ACC)|IMU_"),
@@ -82,7 +84,7 @@ def find(
             + _mending(wanted, part),
             source=source,
             suspect="parameter",
-            probability=_SURE,
+            probability=_SURE_P,
             parameters=tuple(names),
             wanted=wanted,
         )

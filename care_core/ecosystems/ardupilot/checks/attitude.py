@@ -43,15 +43,15 @@ _STILL_S = LIMITS.add(
 )
 _BEGINS = LIMITS.add("rate at first, of a turn that gets faster", 0.8, "of it", "a choice: noise is less")
 _NEARLY = LIMITS.add("rate off a turn that is followed", 0.5, "of it", "a choice: rates lag as a turn begins")
-_TURNED = LIMITS.add("probability of wrong turning directions", 0.7, "", "a choice: yaw that is spent shows alike")
+_TURNED_P = LIMITS.add("probability of wrong turning directions", 0.7, "", "a choice: yaw that is spent shows alike")
 _WAVERS_DEG = LIMITS.add("heading that wavers in a turn", 10.0, "deg", "a choice: gusts push a turn back by less")
 _NEARER = LIMITS.add(
     "share of the error left after a turn", 0.6, "", "a choice: a turn that is followed brings it much nearer"
 )
-_OFF = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
-_LOST = LIMITS.add("probability of a part, control lost", 0.3, "", "a choice: control is lost for many reasons")
+_OFF_P = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
+_LOST_P = LIMITS.add("probability of a part, control lost", 0.3, "", "a choice: control is lost for many reasons")
 _AFTER_S = LIMITS.add("attitude looked at after control was lost", 5.0, "s", "a choice: most falls are over by then")
-_OVER = LIMITS.add("probability of what lies upside down", 0.5, "", "a choice: it turned, or its board is mounted so")
+_OVER_P = LIMITS.add("probability of what lies upside down", 0.5, "", "a choice: it turned, or its board is mounted so")
 LIMITS.add("tilt of what is upside down", UPSIDE_DOWN_DEG, "deg", "a choice: no slope and no wave")
 UPSIDE_DOWN = "the vehicle is upside down"
 """Of what lay so before anybody looked, and did not turn over."""
@@ -81,16 +81,16 @@ _ALL_STEERING = LIMITS.add("output of all that the steering has", 4500.0, "", "A
 _GETS_ON_S = LIMITS.add(
     "swing that keeps a rover from its way", 30.0, "s", "a choice: what only corrects its heading drives on sooner"
 )
-_SPENT = LIMITS.add(
+_SPENT_P = LIMITS.add(
     "probability of a swing that takes all the motors have", 0.85, "",
     "31 of 34 such training flights fail; all 106 that swing have a gain raised or the gyros' filter lowered",
 )  # fmt: skip
-_SWINGS = LIMITS.add("probability of any other swing", 0.2, "", "a choice: the motors have more to give")
+_SWINGS_P = LIMITS.add("probability of any other swing", 0.2, "", "a choice: the motors have more to give")
 _GROWS = LIMITS.add("growth of each swing that gets out of hand", 1.5, "", "a choice: gusts come and go")
 _SWUNG_UP = LIMITS.add("swings to either side that grow", 4, "", "a choice: two or three are a blow and what rights it")
 _LEAST_DPS = LIMITS.add("least of them", 3.0, "deg/s", "a choice: a hover's own movements")
 _LENGTHENS = LIMITS.add("times as long as the one before", 3.0, "", "a choice: a swing keeps its time")
-_OUT_OF_HAND = LIMITS.add(
+_OUT_OF_HAND_P = LIMITS.add(
     "probability of a swing that grows until control is lost",
     0.6,
     "",
@@ -130,7 +130,7 @@ def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
         severity="critical",
         evidence=f"the attitude is up to {float(np.max(after)):.0f} deg off its target and does not recover",
         source="ATT; 30 degrees: ArduCopter's crash check",
-        probability=_LOST,
+        probability=_LOST_P,
     )
 
 
@@ -175,7 +175,7 @@ def _upside_down(flight: Flight) -> Iterator[Finding]:
         ),
         source="ATT.Roll, Pitch",
         suspect="world" if turned else "parameter",
-        probability=_OVER,
+        probability=_OVER_P,
     )
 
 
@@ -196,7 +196,7 @@ def _far(flight: Flight) -> Iterator[Finding]:
             severity=severity,
             evidence=f"roll and pitch are up to {worst:.0f} deg off (limit {FAR_DEG:g})",
             source="ATT against DesRoll, DesPitch",
-            probability=_OFF,
+            probability=_OFF_P,
             suspect="parameter",
         )
 
@@ -220,7 +220,7 @@ def _yaw(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence=f"up to {top(off[during(spans, table.t)]):.0f} deg off (limit {YAW_DEG:g})",
             source="ATT.Yaw against DesYaw",
-            probability=_OFF,
+            probability=_OFF_P,
         )
 
 
@@ -257,7 +257,7 @@ def _spins(flight: Flight) -> Iterator[Finding]:
             evidence=f"it turns faster and faster, up to {most:.0f} deg/s, with the motors told to turn it back{why}",
             source="RATE.Y, YDes, YOut",
             suspect="hardware" if had_turned else "operation",
-            probability=_LOST if had_turned else _TURNED,
+            probability=_LOST_P if had_turned else _TURNED_P,
         )
 
 
@@ -338,7 +338,7 @@ def swings(flight: Flight) -> Iterator[Finding]:
         ),
         source="RATE against its demand",
         suspect="parameter",
-        probability=_SPENT if spent or down else _SWINGS,
+        probability=_SPENT_P if spent or down else _SWINGS_P,
     )
 
 
@@ -364,7 +364,7 @@ def _swung_up(flight: Flight) -> Iterator[Finding]:
         ),
         source="RATE",
         suspect="parameter",
-        probability=_OUT_OF_HAND,
+        probability=_OUT_OF_HAND_P,
     )
 
 
@@ -420,7 +420,7 @@ def _steering(flight: Flight) -> Iterator[Finding]:
         ),
         source="STER.TurnRate against its demand",
         suspect="parameter",
-        probability=_SPENT if stays else _SWINGS,
+        probability=_SPENT_P if stays else _SWINGS_P,
     )
 
 

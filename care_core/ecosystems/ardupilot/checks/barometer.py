@@ -66,11 +66,11 @@ _ON_WINGS = calibrated(
     "8 of 9 simulated flights of planes above twice a limit have a failing barometer, none of 3 below",
     "a limit, of a plane",
 )
-_LOST = LIMITS.add(
+_LOST_P = LIMITS.add(
     "probability that it costs the mission", 0.55, "",
     "12 of those 17 failed, of flights without a failed part 48 % (a critical finding counts as four flights)",
 )  # fmt: skip
-_ODDS = LIMITS.add("probability where a range finder contradicts it", 0.3, "", "a choice: either may be wrong")
+_ODDS_P = LIMITS.add("probability where a range finder contradicts it", 0.3, "", "a choice: either may be wrong")
 _RANGE_GOOD = 4
 """RangeFinder::Status::Good (AP_RangeFinder.h)."""
 _FIX = 3
@@ -129,7 +129,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         evidence=f"it {said}",
         source="BARO.Alt against its neighbours, BARO of the second, GPS.Alt; Copter's pre-arm check allows 1 m",
         probability=calibrated_probability(max(peaks), _ON_WINGS if flight.is_winged else _CALIBRATION),
-        mission_lost=_LOST,
+        mission_lost=_LOST_P,
     )
 
 
@@ -163,7 +163,7 @@ def _contradicted(flight: Flight) -> Iterator[Finding]:
             severity="info",
             evidence=f"they drifted {most:.1f} m apart within {_LOW_M:g} m of the ground (limit {APART_M:g} m)",
             source="BARO or CTUN.BAlt against RFND or CTUN.SAlt; Copter's pre-arm check allows 1 m to the estimator",
-            probability=_ODDS,
+            probability=_ODDS_P,
         )
 
 

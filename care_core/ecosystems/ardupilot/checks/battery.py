@@ -48,16 +48,18 @@ _CALIBRATION = calibrated(
     "by the share of 3.9 V that is missing: all 16 training flights that rest below it have a drained pack, no other",
     "missing",
 )
-_HELD = LIMITS.add("probability that a pack that held loses a mission", 0.05, "", "none below 3.9 V and above 3.3 did")
+_HELD_P = LIMITS.add(
+    "probability that a pack that held loses a mission", 0.05, "", "none below 3.9 V and above 3.3 did"
+)
 _SOON_S = LIMITS.add("flight after which a charged pack is still strong", 60.0, "s", "a choice: packs last for minutes")
-_WEAK = LIMITS.add("probability of a charged pack that sags deep so soon", 0.9, "", "a choice: worn, or too small")
+_WEAK_P = LIMITS.add("probability of a charged pack that sags deep so soon", 0.9, "", "a choice: worn, or too small")
 _GONE_V = LIMITS.add("drop of a cell at rest since the first run", 0.1, "V", "a choice: it has been flown since")
-_DEEP = LIMITS.add("probability of a pack that sags deep", 0.4, "", "a choice: a weak pack, or a full throttle")
-_SAGS = LIMITS.add("probability of a pack that sags", 0.25, "", "a choice: most packs do at the end of a flight")
-_FAILSAFE = LIMITS.add("probability of a bad pack, failsafe alone", 0.1, "", "a choice: mostly a flight too long")
-_NOTHING = LIMITS.add("probability of a monitor that measures nothing", 0.95, "", "the vehicle flew on")
-_MONITOR = LIMITS.add("probability of a monitor not calibrated", 0.3, "", "a choice: it harms failsafes only")
-_BOARD = LIMITS.add("probability of a weak board supply", 0.7, "", "a choice: below 4.3 V the board may restart")
+_DEEP_P = LIMITS.add("probability of a pack that sags deep", 0.4, "", "a choice: a weak pack, or a full throttle")
+_SAGS_P = LIMITS.add("probability of a pack that sags", 0.25, "", "a choice: most packs do at the end of a flight")
+_FAILSAFE_P = LIMITS.add("probability of a bad pack, failsafe alone", 0.1, "", "a choice: mostly a flight too long")
+_NOTHING_P = LIMITS.add("probability of a monitor that measures nothing", 0.95, "", "the vehicle flew on")
+_MONITOR_P = LIMITS.add("probability of a monitor not calibrated", 0.3, "", "a choice: it harms failsafes only")
+_BOARD_P = LIMITS.add("probability of a weak board supply", 0.7, "", "a choice: below 4.3 V the board may restart")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -107,7 +109,7 @@ def _not_charged(flight: Flight, rest: float, cells: int, lowest: float | None) 
         ),
         source="BAT.Volt before take-off; voltages of lithium polymer cells",
         probability=calibrated_probability(1 - rest / cells / NOT_FULL, _CALIBRATION),
-        mission_lost=None if is_lost else _HELD,
+        mission_lost=None if is_lost else _HELD_P,
     )
 
 
@@ -138,7 +140,7 @@ def _sags(flight: Flight, table: Table, low: list[Span], lowest: float, cells: i
             + _and_failsafe(failsafe)
         ),
         source=f"BAT.Volt; {CRITICAL} V a cell: {_ADVICE}",
-        probability=_WEAK if is_weak else _DEEP if is_deep else _SAGS,
+        probability=_WEAK_P if is_weak else _DEEP_P if is_deep else _SAGS_P,
     )
 
 
@@ -158,7 +160,7 @@ def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: f
         evidence=f"failsafe at {volts:.1f} V, {volts / cells:.2f} V for each of {cells} cells{asks}",
         source="ERR of the battery failsafe; BAT.Volt",
         suspect="operation",
-        probability=_FAILSAFE,
+        probability=_FAILSAFE_P,
     )
 
 
@@ -179,7 +181,7 @@ def _of_no_battery(flight: Flight, table: Table) -> Finding | None:
         evidence=(f"{volts:.1f} V drive no vehicle" if volts < supply.DRIVES_V else why)
         + ": look at its wiring and its pin; the thresholds are not to blame",
         source="BAT.Volt; battery failsafe",
-        probability=_NOTHING,
+        probability=_NOTHING_P,
     )
 
 
@@ -232,7 +234,7 @@ def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
             evidence=odd,
             source="BAT",
             suspect="parameter",
-            probability=_MONITOR,
+            probability=_MONITOR_P,
         )
 
 
@@ -255,7 +257,7 @@ def _board(flight: Flight) -> Iterator[Finding]:
         severity="critical" if dips and weak.sum() > _DIPS else "warning",
         evidence=f"Vcc down to {least:.2f} V (limit {_BOARD_V}), {usual:.2f} V in the middle",
         source="POWR.Vcc; 4.3 V: ArduPilot, Diagnosing problems using logs",
-        probability=_BOARD,
+        probability=_BOARD_P,
     )
 
 

@@ -27,7 +27,7 @@ _WINDOW_S = LIMITS.add("window in which it is to stir", 2.0, "s", "a choice: gyr
 _STIRS_DEG = LIMITS.add("change of lean of what stirs", 1.5, "deg", "a choice: what hovers sways by more")
 _RISES_M = LIMITS.add("rise of what may fly", 2.0, "m", "a choice: barometers drift by a metre")
 _FEWEST = 4
-_NOTED = LIMITS.add("probability that it costs a mission", 0.0, "", "it says how the run was made")
+_NOTED_P = LIMITS.add("probability that it costs a mission", 0.0, "", "it says how the run was made")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -49,7 +49,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         ),
         source="ATT, CTUN.ThO, BARO.Alt",
         suspect="operation",
-        probability=_NOTED,
+        probability=_NOTED_P,
     )
 
 

@@ -30,7 +30,7 @@ STANDING_MS = LIMITS.add("speed of a rover that stands", 0.08, "m/s", _SOURCE)
 TURNING_DPS = LIMITS.add("turn rate of a rover that stands", float(np.degrees(0.08)), "deg/s", _SOURCE)
 _LASTS_S = LIMITS.add("shortest time blocked", 2.0, "s", _SOURCE)
 LIMITS.add("speed of a copter that is held", STANDS_MS, "m/s", "a choice: wind moves what is free by more")
-_HELD = LIMITS.add("probability of what holds a copter", 0.9, "", "a choice: what else leans, stands and was hit?")
+_HELD_P = LIMITS.add("probability of what holds a copter", 0.9, "", "a choice: what else leans, stands and was hit?")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -80,7 +80,7 @@ def _held_copter(flight: Flight) -> Iterator[Finding]:
             evidence=f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} deg{blow}",
             source="ATT, GPS.Spd; blows by VIBE.Clip and IMU",
             suspect="world",
-            probability=_HELD,
+            probability=_HELD_P,
         )
 
 

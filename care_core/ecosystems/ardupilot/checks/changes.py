@@ -18,7 +18,7 @@ READS: Wanted = merge_needs((attitude.READS, crash.READS))
 
 _RISKY = ("ATC_", "PSC_", "RATE_", "STB_", "INS_", "EK2_", "EK3_", "EKF_", "AHRS_", "COMPASS_", "MOT_", "FRAME",
           "SERVO", "ARMING_", "FS_", "MIXMODE", "BRD_")  # fmt: skip
-_HARMS = LIMITS.add("probability that a change in the air harms", 0.2, "", "a choice: few changes do")
+_HARMS_P = LIMITS.add("probability that a change in the air harms", 0.2, "", "a choice: few changes do")
 _NAMED = 5
 _LEARNED = ("MOT_THST_HOVER", "COMPASS_OFS", "COMPASS_DEC", "INS_GYR", "STAT_", "_CAL", "_ID")
 """What the firmware itself writes while it flies."""
@@ -77,7 +77,7 @@ def _noted(changed: list[Change], where: str) -> Iterator[Finding]:
             + (", ..." if len(changed) > _NAMED else ""),
             source="PARM",
             suspect="parameter",
-            probability=_HARMS,
+            probability=_HARMS_P,
         )
 
 

@@ -59,26 +59,26 @@ _CALIBRATION = calibrated(
     ((1.0, 0.8), (1.5, 0.95), (3.0, 0.98)),
     "all training flights over the limit have a failing compass, and no other",
 )
-_LOST_ON_WINGS = LIMITS.add(
+_LOST_ON_WINGS_P = LIMITS.add(
     "probability that it costs a plane its mission", 0.2, "", "1 of 7 training flights: a plane steers by its course"
 )
-_LOST = LIMITS.add(
+_LOST_P = LIMITS.add(
     "probability that it costs the mission", 0.65, "",
     "6 of 8 such training flights failed, of those without a failed part 48 % (a critical finding counts as four)",
 )  # fmt: skip
-_DEAD = LIMITS.add("probability of a dead compass", 0.95, "", "its field is zero, or it says so itself")
-_REFUSED = LIMITS.add("probability where arming was refused for it", 0.7, "", "the firmware's own word")
-_MOTORS = LIMITS.add(
+_DEAD_P = LIMITS.add("probability of a dead compass", 0.95, "", "its field is zero, or it says so itself")
+_REFUSED_P = LIMITS.add("probability where arming was refused for it", 0.7, "", "the firmware's own word")
+_MOTORS_P = LIMITS.add(
     "probability of a field that follows the motors",
     0.5,
     "",
     "a choice: battery leads do that, and many vehicles fly so",
 )
-_MOTORS_MUCH = LIMITS.add(
+_MOTORS_MUCH_P = LIMITS.add(
     "probability of one that follows them much", 0.7, "", "a choice: more than the share that makes it unusable"
 )
-_ODD = LIMITS.add("probability of a field that the Earth does not have", 0.5, "", "a choice: steel is near, or not")
-_DOUBTED = LIMITS.add("probability where the estimator alone doubts it", 0.2, "", "a choice: mostly others are wrong")
+_ODD_P = LIMITS.add("probability of a field that the Earth does not have", 0.5, "", "a choice: steel is near, or not")
+_DOUBTED_P = LIMITS.add("probability where the estimator alone doubts it", 0.2, "", "a choice: mostly others are wrong")
 _REPLACES = 0.5
 """Share of records without a field below which another compass takes its place: it has more with one than without."""
 
@@ -140,7 +140,7 @@ def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         else "warning",
         evidence="the field of compass 1 is zero or marked unhealthy",
         source="MAG",
-        probability=_DEAD,
+        probability=_DEAD_P,
     )
 
 
@@ -185,7 +185,7 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             ),
             source="MAG, MAG2; AP_COMPASS_MAX_XY_LENGTH_DIFF 200 mGauss",
             probability=calibrated_probability(ratio, _CALIBRATION),
-            mission_lost=_LOST_ON_WINGS if flight.is_winged else _LOST,
+            mission_lost=_LOST_ON_WINGS_P if flight.is_winged else _LOST_P,
         )
 
 
@@ -234,7 +234,7 @@ def _refused(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             severity="critical",
             evidence=said,
             source="MSG; AP_Arming's compass checks",
-            probability=_REFUSED,
+            probability=_REFUSED_P,
         )
 
 
@@ -266,7 +266,7 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
                 "above 60 % it is unusable)"
             ),
             source="MAG against CTUN.ThO; ArduPilot, Compass setup",
-            probability=_MOTORS_MUCH if share > TOO_MUCH else _MOTORS,
+            probability=_MOTORS_MUCH_P if share > TOO_MUCH else _MOTORS_P,
         )
 
 
@@ -291,7 +291,7 @@ def _implausible(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             severity="critical" if _rejected(flight, spans[0][0]) else "warning",
             evidence=(f"length {_ranging(worst)} mGauss (plausible: {_SHORTEST:.0f} to {_LONGEST:.0f})"),
             source="MAG; AP_Arming's limits of the field",
-            probability=_ODD,
+            probability=_ODD_P,
         )
 
 
@@ -308,7 +308,7 @@ def _doubted(flight: Flight) -> Iterator[Finding]:
                 severity="warning",
                 evidence=f"test ratio {np.max(one['SM'][flight.watch(one.t)]):.1f} (limit 1)",
                 source="XKF4.SM; 1 is the limit of its innovation test",
-                probability=_DOUBTED,
+                probability=_DOUBTED_P,
             )
             return
 

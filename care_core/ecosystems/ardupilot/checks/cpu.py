@@ -27,8 +27,8 @@ LONG_SHARE = LIMITS.add(
 )
 FULL_LOAD = LIMITS.add("load of the scheduler", 950.0, "tenths of a per cent", "AP_Scheduler: PM.Load is 1000 at most")
 _LASTS_S = LIMITS.add("shortest overload", 5.0, "s", "a choice: a slow loop now and then harms nothing")
-_STUCK = LIMITS.add("probability where the CPU failsafe acted", 0.8, "", "the firmware's own word")
-_OVERLOADED = LIMITS.add("probability of an overload", 0.4, "", "a choice: most vehicles fly on with late loops")
+_STUCK_P = LIMITS.add("probability where the CPU failsafe acted", 0.8, "", "the firmware's own word")
+_OVERLOADED_P = LIMITS.add("probability of an overload", 0.4, "", "a choice: most vehicles fly on with late loops")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -43,7 +43,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             severity="critical",
             evidence="CPU failsafe",
             source=f"ERR {CPU_FAILSAFE}",
-            probability=_STUCK,
+            probability=_STUCK_P,
         )
         return
     table = flight.one("PM")
@@ -72,7 +72,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence="; ".join(said),
             source="PM.NLon, NL, Load",
-            probability=_OVERLOADED,
+            probability=_OVERLOADED_P,
         )
 
 

@@ -26,11 +26,13 @@ _STICK_LEAST = LIMITS.add("pulse of a stick", 800.0, "us", "receivers send 800 t
 _ANSWERS_S = LIMITS.add("time in which a mode acts on the throttle", 0.5, "s", "a choice: motors answer sooner")
 _FALL_S = LIMITS.add("fall that may have begun in another mode", 2.0, "s", "free fall: 20 m")
 _SINKS_M = LIMITS.add("descent in the second before a mode that is a fall", 0.5, "m", "a choice: a landing is as fast")
-_TIPPED = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a choice: order, direction or propellers")
-_BY_STICKS = LIMITS.add("probability that the sticks turned it over", 0.5, "", "a choice: in acro they do, or a part")
-_CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
-_STEERED = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
-_STRANDED = LIMITS.add("probability of what could not rise", 0.0, "", "it says that the run failed, and nothing of why")
+_TIPPED_P = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a choice: order, direction or propellers")
+_BY_STICKS_P = LIMITS.add("probability that the sticks turned it over", 0.5, "", "a choice: in acro they do, or a part")
+_CRASHED_P = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
+_STEERED_P = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
+_STRANDED_P = LIMITS.add(
+    "probability of what could not rise", 0.0, "", "it says that the run failed, and nothing of why"
+)
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -56,7 +58,7 @@ def find(flight: Flight) -> Iterator[Finding]:
                 "show like this"
             ),
             source="ATT, height, ERR 12; 30 degrees: ArduCopter's crash check",
-            probability=_TIPPED,
+            probability=_TIPPED_P,
             suspect="operation",
         )
     elif told is not None or said is not None or impact is not None:
@@ -85,7 +87,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence="; ".join(filter(None, shown)),
             source="ERR 12, MSG, ATT, IMU, height",
             suspect="operation" if steered or by_sticks else "hardware",
-            probability=_STEERED if steered else _BY_STICKS if by_sticks else _CRASHED,
+            probability=_STEERED_P if steered else _BY_STICKS_P if by_sticks else _CRASHED_P,
         )
 
 
@@ -111,7 +113,7 @@ def _stranded(flight: Flight) -> Iterator[Finding]:
                 f"on the ground for {end - start:.0f} s with the motors up, below the height that it is told to reach"
             ),
             source="CTUN",
-            probability=_STRANDED,
+            probability=_STRANDED_P,
         )
 
 

@@ -26,9 +26,9 @@ READS: Wanted = {"XKF4": ("SV", "SP", "SH", "SM", "FS")}
 LIMITS = Limits()
 RATIO = LIMITS.add("innovation test ratio", 1.0, "", "AP_NavEKF3: above it a measurement is rejected")
 _LASTS_S = LIMITS.add("shortest rejection", 2.0, "s", "a choice: single outliers are what the test is for")
-_REJECTED = LIMITS.add("probability that the estimator is at fault", 0.2, "", "a choice: mostly its sensors are")
-_SWITCHED = LIMITS.add("probability of a changed lane", 0.3, "", "a choice: it switches to the better sensor")
-_BOOTED = LIMITS.add("probability of ARMING_REQUIRE", 0.9, "", "it is all over once there is a position")
+_REJECTED_P = LIMITS.add("probability that the estimator is at fault", 0.2, "", "a choice: mostly its sensors are")
+_SWITCHED_P = LIMITS.add("probability of a changed lane", 0.3, "", "a choice: it switches to the better sensor")
+_BOOTED_P = LIMITS.add("probability of ARMING_REQUIRE", 0.9, "", "it is all over once there is a position")
 _STANDS_S = LIMITS.add("shortest check that is not cleared", 5.0, "s", "a choice: disarming ends it as well")
 _TITLE = "the estimator rejects its measurements"
 _WORDS = {"SV": "velocity", "SP": "position", "SH": "height", "SM": "magnetic field"}
@@ -82,7 +82,7 @@ def _stands(start_s: float, end_s: float) -> Finding:
         severity="warning",
         evidence=f"the firmware's EKF check failed at {log_time(start_s)} and was not cleared while it was armed",
         source=f"ERR {EKF_CHECK}",
-        probability=_REJECTED,
+        probability=_REJECTED_P,
     )
 
 
@@ -98,7 +98,7 @@ def _switched(flight: Flight) -> Iterator[Finding]:
             severity="info",
             evidence="; ".join(dict.fromkeys(text for t, text in flight.messages if t in switched)),
             source="MSG",
-            probability=_SWITCHED,
+            probability=_SWITCHED_P,
         )
 
 
@@ -115,7 +115,7 @@ def _armed_too_early(failed_s: float, position_s: float) -> Finding:
         ),
         source="ERR, MSG, PARM",
         suspect="parameter",
-        probability=_BOOTED,
+        probability=_BOOTED_P,
         parameters=(_NEEDS_NO_ARMING,),
         wanted=((_NEEDS_NO_ARMING, 1.0),),
     )
@@ -134,7 +134,7 @@ def _rejects(worst: Mapping[str, _Rejection], failed: list[float]) -> Finding:
         severity="critical" if failed else "warning",
         evidence=evidence,
         source="XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH",
-        probability=_REJECTED,
+        probability=_REJECTED_P,
     )
 
 

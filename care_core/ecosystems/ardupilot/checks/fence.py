@@ -20,8 +20,8 @@ READS: Wanted = {"CTUN": ("DAlt",), "POS": ("Lat", "Lng")}
 
 LIMITS = Limits()
 _BEYOND_M = LIMITS.add("what was asked for beyond the fence", 0.0, "m", "the vehicle is stopped at the fence itself")
-_WAS_SENT = LIMITS.add("probability of the fence", 0.9, "", "what was asked for lies beyond it")
-_STOPS = LIMITS.add("probability that a mission fails of it", 0.95, "", "the rest of the mission is not flown")
+_WAS_SENT_P = LIMITS.add("probability of the fence", 0.9, "", "what was asked for lies beyond it")
+_STOPS_P = LIMITS.add("probability that a mission fails of it", 0.95, "", "the rest of the mission is not flown")
 _BEFORE_S = 0.1
 _BY_ITSELF = frozenset(("mission", "guided"))
 _TOO_HIGH, _TOO_FAR = 1, 2
@@ -56,8 +56,8 @@ def find(flight: Flight) -> Iterator[Finding]:
                 ),
                 source="ERR 9, CMD, CTUN.DAlt; AC_Fence.h",
                 suspect="parameter",
-                probability=_WAS_SENT,
-                mission_lost=_STOPS,
+                probability=_WAS_SENT_P,
+                mission_lost=_STOPS_P,
                 parameters=_set_so(flight, parameter),
             )
             return

@@ -68,7 +68,7 @@ _FEW = calibrated(
     "only training flights with a failing receiver have 6 satellites or fewer",
     "too few satellites",
 )
-_LOST = LIMITS.add(
+_LOST_P = LIMITS.add(
     "probability that few satellites cost the mission", 0.15, "",
     "4 of 11 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
 )  # fmt: skip
@@ -77,10 +77,10 @@ _DRIVES_MS, _DRIVES_S = (
     LIMITS.add("time of it", 5.0, "s", "a choice: longer than a receiver finds its fix"),
 )
 _DRIVES = LIMITS.add("throttle that drives", 0.02, "", "a choice: what idles has less")
-_NO_FIX = LIMITS.add("probability of a lost fix", 0.9, "", "the receiver's own word")
-_GLITCHED = LIMITS.add("probability of a reported glitch", 0.6, "", "a choice: the firmware's word, without the size")
-_LEAPT = LIMITS.add("probability of a receiver whose height leaps", 0.8, "", "a choice: nothing flies so")
-_DOUBTS = LIMITS.add("probability where it is only inaccurate", 0.4, "", "a choice: buildings and trees do that")
+_NO_FIX_P = LIMITS.add("probability of a lost fix", 0.9, "", "the receiver's own word")
+_GLITCHED_P = LIMITS.add("probability of a reported glitch", 0.6, "", "a choice: the firmware's word, without the size")
+_LEAPT_P = LIMITS.add("probability of a receiver whose height leaps", 0.8, "", "a choice: nothing flies so")
+_DOUBTS_P = LIMITS.add("probability where it is only inaccurate", 0.4, "", "a choice: buildings and trees do that")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -193,7 +193,7 @@ def _leaps(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence=f"by up to {np.max(by_m):.0f} m in {_LEAPS_S:g} s against the barometer (limit {_LEAP_M:g} m)",
             source="GPS.Alt against BARO.Alt or CTUN.BAlt",
-            probability=_LEAPT,
+            probability=_LEAPT_P,
         )
 
 
@@ -251,7 +251,7 @@ def _reported(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence=f"{len(inside)} GPS glitch{'es' * (len(inside) > 1)} reported in flight",
             source="ERR 11-2 (GPS glitch)",
-            probability=_GLITCHED,
+            probability=_GLITCHED_P,
         )
 
 
@@ -273,7 +273,7 @@ def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
             severity=severity,
             evidence=f"no 3D fix for {total:.0f} s",
             source="GPS.Status below 3",
-            probability=_NO_FIX,
+            probability=_NO_FIX_P,
         )
 
 
@@ -322,7 +322,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
             evidence=f"{least:.0f} satellites (the estimator wants {FEWEST:.0f}, {usual:.0f} were there)",
             source="GPS.NSats; 6: AP_NavEKF3_VehicleStatus.cpp",
             probability=calibrated_probability(FEWEST / max(least, 1.0), _FEW),
-            mission_lost=None if harmed else _LOST,
+            mission_lost=None if harmed else _LOST_P,
         )
         return
     if "HDop" not in table.columns:
@@ -339,7 +339,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
             evidence=f"HDop up to {worst:.1f} (good below 1.5, poor above {POOR_HDOP:g})",
             source="GPS.HDop; ArduPilot, Diagnosing problems using logs",
             suspect="world",
-            probability=_DOUBTS,
+            probability=_DOUBTS_P,
         )
 
 
@@ -370,7 +370,7 @@ def _inaccurate(flight: Flight) -> Iterator[Finding]:
             evidence=f"it expects errors of up to {np.max(part['HAcc']):.1f} m and {np.max(part['SAcc']):.1f} m/s",
             source="GPA.HAcc, SAcc; the firmware's checks want 5 m and 1 m/s",
             suspect="world",
-            probability=_DOUBTS,
+            probability=_DOUBTS_P,
         )
 
 

@@ -28,13 +28,13 @@ LIMITS = Limits()
 _APART_M = LIMITS.add("estimate off the barometer", 5.0, "m", "five times what arming allows")
 _LASTS_S = LIMITS.add("shortest time of it", 5.0, "s", "a choice: a descent through its own wash is over sooner")
 _CLIMB_MS = LIMITS.add("climb off the barometer's", 2.0, "m/s", "more than LAND_SPEED: it lands as it means to hold")
-_CLIMB_LASTS_S = LIMITS.add("shortest time of it", 3.0, "s", "a choice: a gust on the static port is over sooner")
+_CLIMB_LASTS_S = LIMITS.add("shortest such climb", 3.0, "s", "a choice: a gust on the static port is over sooner")
 _GRAVITY = LIMITS.add("gravity", GRAVITY, "m/s^2", "physics")
 _OFF = LIMITS.add("gravity off, at rest", 0.5, "m/s^2", "a choice: a calibrated accelerometer is within 0.1")
 _FAR_OFF = LIMITS.add("gravity far off, at rest", 1.0, "m/s^2", "MPU-6000, not calibrated: 0.8 on one axis")
 _REST = LIMITS.add("throttle at rest", 0.05, "", "a choice: motors that idle shake little")
-_TRUE = LIMITS.add("probability that it is so", 0.8, "", "a choice: both are measured; which one is wrong is not")
-_LOST = LIMITS.add("probability that it costs the mission", 0.4, "", "a choice: the barometer corrects most of it")
+_TRUE_P = LIMITS.add("probability that it is so", 0.8, "", "a choice: both are measured; which one is wrong is not")
+_LOST_P = LIMITS.add("probability that it costs the mission", 0.4, "", "a choice: the barometer corrects most of it")
 _SOURCES = (("EK3_SRC1_POSZ", 1.0), ("EK3_ALT_SOURCE", 0.0), ("EK2_ALT_SOURCE", 0.0))
 """The value with which the height is that of the barometer."""
 _HELD = frozenset(("hold", "mission", "return", "land", "guided"))
@@ -89,7 +89,7 @@ def _climb_parted(flight: Flight, heard: tuple[Floats, Floats]) -> Finding | Non
         evidence=f"the estimate says {said:+.1f} m/s and the barometer {rose:+.1f} m/s (limit {_CLIMB_MS:g} m/s apart) "
         f"for {seconds_in(spans):.0f} s in a mode that holds the height{_at_rest(flight)}",
         source="CTUN.CRt against CTUN.BAlt or BARO.Alt",
-        probability=_TRUE,
+        probability=_TRUE_P,
     )
 
 
@@ -122,8 +122,8 @@ def _not_gravity(flight: Flight, *, is_critical: bool) -> Iterator[Finding]:
             evidence=f"{felt[0]:.1f} m/s^2 before take-off, gravity is {_GRAVITY:g} (limit {_FAR_OFF:g} off): "
             "calibrate them",
             source="IMU.AccX, AccY, AccZ before the throttle is raised",
-            probability=_TRUE,
-            mission_lost=None if is_critical else _LOST,
+            probability=_TRUE_P,
+            mission_lost=None if is_critical else _LOST_P,
         )
 
 
@@ -150,7 +150,7 @@ def _parted(flight: Flight, estimate: tuple[Floats, Floats], heard: tuple[Floats
         severity="critical" if _holds_height(flight, start, end) else "warning",
         evidence=f"they are up to {most:.0f} m apart (limit {_APART_M:g} m){_at_rest(flight)}",
         source="CTUN.Alt or POS.RelHomeAlt against CTUN.BAlt or BARO.Alt",
-        probability=_TRUE,
+        probability=_TRUE_P,
     )
 
 

@@ -89,7 +89,7 @@ _WORSE = LIMITS.add(
 _CALIBRATION = calibrated(
     LIMITS, ((1.0, 0.7), (2.0, 0.93), (10.0, 0.97)), "12 of 13 training flights with failing gyros exceed it, no other"
 )
-_LOST = LIMITS.add(
+_LOST_P = LIMITS.add(
     "probability that noise costs the mission", 0.15, "",
     "4 of 10 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
 )  # fmt: skip
@@ -111,9 +111,9 @@ _PLANE_SHAKEN_DPS = LIMITS.add(
     "deg/s",
     "a choice: lower than of others, for a plane rolls and pitches all the time",
 )
-_FAILED = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
-_OFFSET = LIMITS.add("probability of a gyro that is offset at rest", 0.9, "", "nothing turns while gravity stays")
-_APART = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
+_FAILED_P = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
+_OFFSET_P = LIMITS.add("probability of a gyro that is offset at rest", 0.9, "", "nothing turns while gravity stays")
+_APART_P = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -146,7 +146,7 @@ def _unhealthy(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
                     severity="critical",
                     evidence=f"{name} {n} is marked unhealthy for {seconds_in(spans):.1f} s",
                     source=f"IMU.{flag}",
-                    probability=_FAILED,
+                    probability=_FAILED_P,
                 )
 
 
@@ -168,7 +168,7 @@ def _offset(flight: Flight) -> Iterator[Finding]:
                 f"(limit {gravity.TURNS_DPS:g}): calibrate the gyros standing still"
             ),
             source="IMU.GyrX, GyrY, GyrZ against AccX, AccY, AccZ with the motors down",
-            probability=_OFFSET,
+            probability=_OFFSET_P,
         )
 
 
@@ -214,7 +214,7 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
         ),
         source="IMU.GyrX, GyrY, GyrZ of both; AP_Arming allows 5 degrees/s at rest",
         probability=calibrated_probability(ratio, _CALIBRATION),
-        mission_lost=_LOST if is_noise and severity == "warning" else None,
+        mission_lost=_LOST_P if is_noise and severity == "warning" else None,
     )
 
 
@@ -305,7 +305,7 @@ def _accelerometers(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
                 "vibration explains)"
             ),
             source="IMU.AccX, AccY, AccZ of both; ARMING_ACCTHRESH 0.75 m/s^2 at rest",
-            probability=_APART,
+            probability=_APART_P,
         )
 
 

@@ -15,7 +15,7 @@ from care_core.text import log_time
 READS: Wanted = {}
 
 LIMITS = Limits()
-_DETECTED = LIMITS.add("probability of a leak", 0.9, "", "the firmware's own word")
+_DETECTED_P = LIMITS.add("probability of a leak", 0.9, "", "the firmware's own word")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -35,8 +35,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         severity="critical",
         evidence=f"a leak detector tells of water from {log_time(since)} on",
         source=f"ERR {LEAK}, MSG",
-        probability=_DETECTED,
-        mission_lost=_DETECTED,
+        probability=_DETECTED_P,
+        mission_lost=_DETECTED_P,
     )
 
 

@@ -34,10 +34,12 @@ _ALIKE = LIMITS.add(
     "correlation with what the arm gives", 0.4, "", "one of 600 training flights has it with an arm of 3 m put in"
 )
 _FOLLOWS = LIMITS.add("share of the arm that it follows", 0.2, "", "in a thinned log much of a turn is missed")
-_SURE = LIMITS.add("probability of the arm", 0.9, "", "all 13 such flights have an arm that is not there")
-_LOST = LIMITS.add("probability that a mission fails of it, after an EKF failsafe", 0.95, "", "7 of 7 such flights")
-_OFF_PATH = LIMITS.add("probability that a mission fails of a wrong antenna, else", 0.8, "", "3 of 3 such flights")
-_IN_TURNS = LIMITS.add("probability that a mission fails of a wrong IMU, else", 0.3, "", "none of 8 flights; a choice")
+_SURE_P = LIMITS.add("probability of the arm", 0.9, "", "all 13 such flights have an arm that is not there")
+_LOST_P = LIMITS.add("probability that a mission fails of it, after an EKF failsafe", 0.95, "", "7 of 7 such flights")
+_OFF_PATH_P = LIMITS.add("probability that a mission fails of a wrong antenna, else", 0.8, "", "3 of 3 such flights")
+_IN_TURNS_P = LIMITS.add(
+    "probability that a mission fails of a wrong IMU, else", 0.3, "", "none of 8 flights; a choice"
+)
 _STEP_S, _LEARNED_S = 0.1, 1.0
 _LAGS_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
 """Receivers are late by so much (AP_GPS)."""
@@ -76,8 +78,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         ),
         source="XKF3.IVN, IVE, IVD against RATE and ATT; PARM",
         suspect="parameter",
-        probability=_SURE,
-        mission_lost=arm.fails if lost is None else _LOST,
+        probability=_SURE_P,
+        mission_lost=arm.fails if lost is None else _LOST_P,
         parameters=arm.parameters,
         wanted=((arm.parameters[0], 0.0),) if len(arm.parameters) == 1 else (),
     )
@@ -85,8 +87,8 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def _arms(flight: Flight) -> Iterator[_Arm]:
     for what, sign, fails, names in (
-        ("the GPS antenna", 1.0, _OFF_PATH, ("GPS_POS1_{}", "GPS1_POS_{}")),
-        ("the IMU", -1.0, _IN_TURNS, ("INS_POS1_{}",)),
+        ("the GPS antenna", 1.0, _OFF_PATH_P, ("GPS_POS1_{}", "GPS1_POS_{}")),
+        ("the IMU", -1.0, _IN_TURNS_P, ("INS_POS1_{}",)),
     ):
         for name in names:
             arm = {name.format(axis): flight.setting(name.format(axis)) or 0.0 for axis in "XYZ"}

@@ -32,9 +32,9 @@ _FALLS_V = LIMITS.add(
     "fall of the board's supply", 0.3, "V", "ArduPilot, Power module and brown-outs: twice the swing that is normal"
 )
 _LEAST_V = LIMITS.add("supply that is recorded", 1.0, "V", "a choice: below it nothing measures")
-_HOLE = LIMITS.add("probability of a hole", 0.3, "", "a choice: most are the card's")
-_POWER_LOST = LIMITS.add("probability of lost power", 0.7, "", "a choice: the supply fell before")
-_ENDS = LIMITS.add("probability of an end in the air", 0.4, "", "a choice: recordings are stopped, too")
+_HOLE_P = LIMITS.add("probability of a hole", 0.3, "", "a choice: most are the card's")
+_POWER_LOST_P = LIMITS.add("probability of lost power", 0.7, "", "a choice: the supply fell before")
+_ENDS_P = LIMITS.add("probability of an end in the air", 0.4, "", "a choice: recordings are stopped, too")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -62,7 +62,7 @@ def _other_vehicles(flight: Flight) -> Iterator[Finding]:
             evidence=evidence,
             source="HEARTBEAT",
             suspect="operation",
-            probability=_HOLE,
+            probability=_HOLE_P,
         )
 
 
@@ -86,7 +86,7 @@ def _holes(flight: Flight) -> Iterator[Finding]:
                 evidence=f"{len(low)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
                 source="times of the telemetry",
                 suspect="world",
-                probability=_HOLE,
+                probability=_HOLE_P,
             )
             return
         yield Finding(
@@ -97,7 +97,7 @@ def _holes(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence=f"{total:.1f} s without any record (limit {limit:.0f} s)",
             source="times of ATT, RCOU, CTUN, IMU",
-            probability=_HOLE,
+            probability=_HOLE_P,
         )
 
 
@@ -127,7 +127,7 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         evidence=f"armed {'and ' * aloft.is_falling}{aloft} at the last record: "
         + (sagging or "power was lost or the recording was stopped"),
         source="EV, ARM, CTUN, POS, POWR",
-        probability=_POWER_LOST if sagging else _ENDS,
+        probability=_POWER_LOST_P if sagging else _ENDS_P,
     )
 
 

@@ -27,8 +27,8 @@ _ABOVE_M = LIMITS.add("height above the mission's highest item", 100.0, "m", "a 
 _TIMES = LIMITS.add("that height as a share of the highest item's", 1.0, "", "a choice: of high missions likewise")
 _LASTS_S = LIMITS.add("shortest time of it", 10.0, "s", "a choice: a receiver that jumps is back sooner")
 _LEAST_OFFSET_M = LIMITS.add("offset that lifts a mission out of its limits", 50.0, "m", "half of what is told here")
-_SURE = LIMITS.add("probability of the offset", 0.97, "", "it is what the height says")
-_LIKELY = LIMITS.add("probability that it was set to", 0.6, "", "a choice: else its height is false")
+_SURE_P = LIMITS.add("probability of the offset", 0.97, "", "it is what the height says")
+_LIKELY_P = LIMITS.add("probability that it was set to", 0.6, "", "a choice: else its height is false")
 _OFFSET = "ALT_OFFSET"
 _RELATIVE = 3
 """MAV_FRAME_GLOBAL_RELATIVE_ALT: above home."""
@@ -86,7 +86,7 @@ def _finding(flight: Flight, start: float, end: float, reached_m: float, highest
         evidence=f"{reached_m:.0f} m up, where the mission asks for {highest_m:.0f} m at most{lifted}",
         source="POS.RelHomeAlt, CMD; PARM",
         suspect="parameter",
-        probability=_SURE if is_lifted else _LIKELY,
+        probability=_SURE_P if is_lifted else _LIKELY_P,
         parameters=(_OFFSET,) if is_lifted else (),
         wanted=((_OFFSET, 0.0),) if is_lifted else (),
     )

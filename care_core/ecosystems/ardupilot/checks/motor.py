@@ -104,15 +104,15 @@ _ALWAYS = calibrated(
     "a choice: a twisted arm or an uneven load looks the same",
     "an excess from the start on",
 )
-_GAVE_LITTLE = LIMITS.add("probability where it fell towards a motor", 0.85, "", "a choice: outputs are told often")
-_PERHAPS = LIMITS.add(
+_GAVE_LITTLE_P = LIMITS.add("probability where it fell towards a motor", 0.85, "", "a choice: outputs are told often")
+_PERHAPS_P = LIMITS.add(
     "probability where it fell, of few records",
     0.6,
     "",
     "a choice: outputs that are told seldom may be those of the fall",
 )
-_REPORTED = LIMITS.add("probability of a reported thrust loss", 0.2, "", "a choice: it names who is asked for most")
-_STOPPED = LIMITS.add("probability of a motor that stopped", 0.95, "", "its controller's own word")
+_REPORTED_P = LIMITS.add("probability of a reported thrust loss", 0.2, "", "a choice: it names who is asked for most")
+_STOPPED_P = LIMITS.add("probability of a motor that stopped", 0.95, "", "its controller's own word")
 _AROUND_S = 5.0
 """So long around what the firmware says, a vehicle flies about as it did."""
 _THRUST_LOSS = re.compile(r"Potential Thrust Loss \((\d+)\)")
@@ -362,7 +362,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         "critical",
         f"asked for {100 * share[n]:.0f} % (others {100 * median(others):.0f} %), yet the vehicle fell towards it: "
         f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
-        f"{_SOURCE}, and ATT", _GAVE_LITTLE if near[0].sum() > 3 else _PERHAPS,
+        f"{_SOURCE}, and ATT", _GAVE_LITTLE_P if near[0].sum() > 3 else _PERHAPS_P,
     )  # fmt: skip
 
 
@@ -445,7 +445,7 @@ def _reported(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
             if motor is not None and not crowded and is_alone:
                 severity: Severity = "critical" if flight.impact_s is not None else "warning"
                 yield _finding(motor, "lost thrust", t, flight.end_s, severity, f"the firmware says: {text}",
-                               "MSG; thrust_loss_check of ArduCopter", _REPORTED)  # fmt: skip
+                               "MSG; thrust_loss_check of ArduCopter", _REPORTED_P)  # fmt: skip
                 return
 
 
@@ -465,7 +465,7 @@ def _stopped(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         if spans := lasting(t, (row < _TURNS * usual) & turning & is_asked, 0.5):
             yield _finding(outputs.motors[n], "stopped", spans[0][0], spans[-1][1], "critical",
                            f"its controller reports {median(row[t >= spans[0][0]]):.0f} turns a minute, the others "
-                           f"{median(usual):.0f}", "ESC.RPM", _STOPPED)  # fmt: skip
+                           f"{median(usual):.0f}", "ESC.RPM", _STOPPED_P)  # fmt: skip
             return
 
 

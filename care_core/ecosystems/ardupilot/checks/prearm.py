@@ -29,10 +29,10 @@ _BY_OPERATOR = re.compile(
 """Complaints of what the pilot has to do or somebody to set up before a start: sticks, switches, mode, calibration.
 None of them reads a parameter that a flight is tuned by (AP_Arming.cpp, AP_Arming_Copter.cpp, RC_Channel.cpp)."""
 LIMITS = Limits()
-_SURE = LIMITS.add(
+_SURE_P = LIMITS.add(
     "probability of what the pilot has to do", 0.95, "", "the firmware says itself that this kept it from arming"
 )
-_BY_SETTING = LIMITS.add("probability of a parameter", 0.3, "", "a choice: a sensor may be the reason as well")
+_BY_SETTING_P = LIMITS.add("probability of a parameter", 0.3, "", "a choice: a sensor may be the reason as well")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -59,7 +59,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         evidence="; ".join(complaints),
         source="MSG",
         suspect=suspect,
-        probability=_SURE if by_operator else _BY_SETTING,
+        probability=_SURE_P if by_operator else _BY_SETTING_P,
     )
     yield _blaming(finding, tuple(one for one in refusing(flight) if one.is_shown or not by_operator))
 

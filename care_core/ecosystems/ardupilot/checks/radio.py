@@ -20,8 +20,8 @@ LIMITS = Limits()
 _BRIEF_S = LIMITS.add(
     "loss that explains no crash", 1.0, "s", "a choice: a failsafe that is over so soon has moved nothing far"
 )
-_LOST = LIMITS.add("probability of a lost link", 0.8, "", "the firmware's own word")
-_BRIEF = LIMITS.add("probability of a brief loss", 0.3, "", "a choice: links drop frames now and then")
+_LOST_P = LIMITS.add("probability of a lost link", 0.8, "", "the firmware's own word")
+_BRIEF_P = LIMITS.add("probability of a brief loss", 0.3, "", "a choice: links drop frames now and then")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -49,7 +49,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence=f"failsafe at {log_time(gone[0])}, " + (f"back after {away:.1f} s" if back else "not back"),
             source=f"ERR {subsystem}",
             suspect="world",
-            probability=_BRIEF if away < _BRIEF_S else _LOST,
+            probability=_BRIEF_P if away < _BRIEF_S else _LOST_P,
         )
 
 

@@ -23,7 +23,7 @@ _SLOW = LIMITS.add(
     "main loop, as a share of what it is shipped with", 0.5, "", "gains as shipped leave no more room (ArduPilot wiki)"
 )
 _IN_BAND_HZ = LIMITS.add("notch in the band of the rate controllers", 30.0, "Hz", "INS_HNTCH_FREQ is 80 as shipped")
-_SURE = LIMITS.add(
+_SURE_P = LIMITS.add(
     "probability of what makes them late, where they swing",
     0.9,
     "",
@@ -61,7 +61,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         evidence=f"{late.shown}; {swing.title}: {swing.evidence}",
         source="PM.LR, NL; RATE; PARM",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         mission_lost=None if swing.severity == "critical" else swing.probability,
         parameters=(late.parameter,),
         wanted=((late.parameter, late.wanted),),

@@ -39,8 +39,8 @@ _STRONG_DPS = LIMITS.add(
     "a choice: thirty times a gyro's own (0.005 deg/s/sqrt(Hz))",
 )
 _STANDS_OUT = LIMITS.add("times what is between the lines", 10.0, "", "a choice: noise without a line varies by less")
-_SURE = LIMITS.add("probability of a notch or a low pass beside its noise", 0.8, "", "it is measured")
-_LOST = LIMITS.add("probability that it costs the mission", 0.1, "", "a choice: most vehicles fly on with it")
+_SURE_P = LIMITS.add("probability of a notch or a low pass beside its noise", 0.8, "", "it is measured")
+_LOST_P = LIMITS.add("probability that it costs the mission", 0.1, "", "a choice: most vehicles fly on with it")
 _WIDE = 0.05
 """A line of motors that do not turn alike is so wide, each way, as a share of its frequency."""
 _SAMPLES, _MOST_PIECES = 1024, 48
@@ -127,8 +127,8 @@ def _finding(flight: Flight, title: str, evidence: str, parameter: str, wanted: 
         evidence=evidence,
         source="spectrum of ISBD or GYR in flight; PARM",
         suspect="parameter",
-        probability=_SURE,
-        mission_lost=_LOST,
+        probability=_SURE_P,
+        mission_lost=_LOST_P,
         parameters=(parameter,),
         wanted=((parameter, wanted),),
     )

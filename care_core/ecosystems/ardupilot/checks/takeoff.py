@@ -42,9 +42,9 @@ _BEGINS, _BEGAN_S = 5.0, 2.0
 _TAKEOFF_S = LIMITS.add("first seconds after the first throttle", 20.0, "s", "a choice: then it has flown")
 _FLEW_M = LIMITS.add("height of what has flown", 2.5, "m", "a choice: above it other things turn it over")
 _THROTTLE = LIMITS.add("first throttle", 0.15, "", "MOT_SPIN_MIN as shipped")
-_SURE = LIMITS.add("probability of a parameter, where motors answer wrongly", 0.9, "", "its layout is a rare one")
-_KEPT = LIMITS.add("probability of a parameter that keeps motors down", 0.95, "", "the firmware does as it says")
-_LOST = LIMITS.add("probability that a mission fails of it", 0.95, "", "it does not take off")
+_SURE_P = LIMITS.add("probability of a parameter, where motors answer wrongly", 0.9, "", "its layout is a rare one")
+_KEPT_P = LIMITS.add("probability of a parameter that keeps motors down", 0.95, "", "the firmware does as it says")
+_LOST_P = LIMITS.add("probability that a mission fails of it", 0.95, "", "it does not take off")
 _DELAY_S = LIMITS.add("disarming off DISARM_DELAY", 0.7, "s", "arming and spooling up take some of it")
 _FULL = LIMITS.add("throttle of what does not rise", 0.9, "", "a choice: any vehicle that can fly rises with less")
 _FULL_S = LIMITS.add("time without rising", 5.0, "s", "a choice: a take-off takes less")
@@ -97,8 +97,8 @@ def wrong_layout(flight: Flight) -> Finding | None:
         ),
         source="RATE against its demand and output, height; PARM",
         suspect="parameter",
-        probability=_SURE,
-        mission_lost=_LOST,
+        probability=_SURE_P,
+        mission_lost=_LOST_P,
         parameters=tuple(values),
         wanted=() if "FRAME_CLASS" in values else tuple((n, v) for n, v in values.items() if v is not None),
     )
@@ -215,8 +215,8 @@ def _no_motors(flight: Flight) -> Finding | None:
         ),
         source="RCOU against CTUN.ThO, height; PARM",
         suspect="parameter",
-        probability=_SURE,
-        mission_lost=_LOST,
+        probability=_SURE_P,
+        mission_lost=_LOST_P,
         parameters=("FRAME_CLASS",),
     )
 
@@ -279,8 +279,8 @@ def _down(title: str, span: Span, evidence: str, source: str, parameter: str, va
         evidence=evidence,
         source=source,
         suspect="parameter",
-        probability=_KEPT,
-        mission_lost=_LOST,
+        probability=_KEPT_P,
+        mission_lost=_LOST_P,
         parameters=(parameter,),
         wanted=() if value is None else ((parameter, value),),
     )

@@ -42,7 +42,7 @@ _CLIMBS_MS = LIMITS.add("climb of what has thrust to spare", 1.0, "m/s", "a choi
 _GROUNDED_S = LIMITS.add("full throttle on the ground", 5.0, "s", "a choice: a take-off takes less")
 SPIN_MOST = LIMITS.add("MOT_SPIN_MAX that keeps motors down", 0.9, "", "AP_MotorsMulticopter: 0.95 as shipped")
 _FLYING = LIMITS.add("least throttle in the air", 0.05, "", "a choice: above it motors turn")
-_LACKS = LIMITS.add("probability where it sinks with nearly all", 0.7, "", "a choice: its own wash sinks it as well")
+_LACKS_P = LIMITS.add("probability where it sinks with nearly all", 0.7, "", "a choice: its own wash sinks it as well")
 _PROBABILITY: Mapping[SuspectKind, float] = {
     "hardware": LIMITS.add(
         "probability of a weak part", 0.3, "", "7 of 83 such training flights have one, and those vary little in weight"
@@ -72,7 +72,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         begin = min([start, *[a for a, _ in high]])
         before = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
         found = _too_little(flight, strained, begin, before, FULL if full else _NEARLY_FULL, sinking)
-        yield replace(found, probability=max(found.probability, _LACKS)) if sinking else found
+        yield replace(found, probability=max(found.probability, _LACKS_P)) if sinking else found
     elif high and seconds_in(high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
         share = 100 * float(median(level[flown]))
         evidence = f"mean throttle {share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %)"

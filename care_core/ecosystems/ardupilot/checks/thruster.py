@@ -33,8 +33,8 @@ _HEADING = LIMITS.add("output that holds the heading", 0.07, "", _MEASURED)
 _STILL_DPS = LIMITS.add("rate that is asked for while it holds still", 6.0, "deg/s", "a choice: turns take output")
 _OVER_S = LIMITS.add("time over which the output is averaged", 5.0, "s", "a choice: waves and gains swing to and fro")
 _LASTS_S = LIMITS.add("shortest time of holding", 8.0, "s", "a choice: a current pushes for a while")
-_FAILED = LIMITS.add("probability of a thruster", 0.75, "", "a choice: an uneven load or a tether pulls as well")
-_LOST = LIMITS.add("probability that it costs the mission", 0.5, "", "5 of 11 such dives")
+_FAILED_P = LIMITS.add("probability of a thruster", 0.75, "", "a choice: an uneven load or a tether pulls as well")
+_LOST_P = LIMITS.add("probability that it costs the mission", 0.5, "", "5 of 11 such dives")
 _NOT_DETECTED = re.compile(r"Failed! Please check Thruster (\d+) and frame setup!")
 """What motor detection says of a thruster that turns the vehicle neither way as its frame would (ArduSub:
 mode_motordetect.cpp)."""
@@ -58,8 +58,8 @@ def _undetected(flight: Flight) -> Iterator[Finding]:
             evidence="it turns the vehicle neither way as its place in the frame would (check wiring, direction "
             f"and FRAME_CONFIG); the firmware says: {match[0]}",
             source="MSG",
-            probability=_FAILED,
-            mission_lost=_LOST,
+            probability=_FAILED_P,
+            mission_lost=_LOST_P,
         )
 
 
@@ -95,8 +95,8 @@ def _fought(flight: Flight) -> Iterator[Finding]:
             f"asked for (limit {100 * limit:.0f} %)"
         ),
         source="RATE.ROut, YOut; ATT.DesRoll, DesYaw",
-        probability=_FAILED,
-        mission_lost=_LOST,
+        probability=_FAILED_P,
+        mission_lost=_LOST_P,
     )
 
 

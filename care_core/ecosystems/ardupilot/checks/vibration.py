@@ -67,7 +67,7 @@ _CALIBRATION = calibrated(
     "every training flight above 10 m/s^2 has failing accelerometers (15 of 15)",
     "acceptable vibration",
 )
-_RAW_PROBABILITY = LIMITS.add("probability without VIBE", 0.6, "", "a choice: accelerations alone tell less")
+_RAW_PROBABILITY_P = LIMITS.add("probability without VIBE", 0.6, "", "a choice: accelerations alone tell less")
 _SOURCE = "VIBE; limits 30 and 60 m/s^2: ArduPilot, Measuring Vibration"
 
 
@@ -191,7 +191,7 @@ def _raw(flight: Flight) -> Finding | None:
         severity=severity,
         evidence=f"accelerations jump by {peak:.0f} m/s^2 between records for {end - start:.0f} s (limit {_RAW:g})",
         source="IMU; limits of 3 and 5 m/s^2 for logs without VIBE: ArduPilot, Measuring Vibration",
-        probability=_RAW_PROBABILITY,
+        probability=_RAW_PROBABILITY_P,
     )
 
 

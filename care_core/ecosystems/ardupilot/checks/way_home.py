@@ -37,14 +37,14 @@ _MOST_SHARE = LIMITS.add(
 )
 _LIKE = LIMITS.add("speed or height off what the parameter says", 0.15, "", "a choice: wind and control take some")
 _STILL_MS = LIMITS.add("speed of what waits in its place", 0.4, "m/s", "a choice: gusts move it by less")
-_SURE = LIMITS.add("probability of a parameter that a phase follows", 0.9, "", "its value and the phase agree")
-_LEAST_LOST = LIMITS.add(
+_SURE_P = LIMITS.add("probability of a parameter that a phase follows", 0.9, "", "its value and the phase agree")
+_LEAST_LOST_P = LIMITS.add(
     "probability that a mission fails of a phase at the limit",
     0.3,
     "",
     "a choice: there most missions still have the time",
 )
-_SURELY_LOST = LIMITS.add(
+_SURELY_LOST_P = LIMITS.add(
     "probability that a mission fails of a phase far beyond", 0.9, "", "a choice: there hardly any has the time"
 )
 
@@ -105,9 +105,9 @@ def _slow_phase(flight: Flight, phase: _Slow) -> Iterator[Finding]:
     least = _SHARE if flight.battery_failsafe_s is None else _SHARE_CUT_SHORT
     if value == default or phase.costs_s < _COSTS_S or share < least:
         return
-    lost = float(np.interp(share, (least, _MOST_SHARE), (_LEAST_LOST, _SURELY_LOST)))
+    lost = float(np.interp(share, (least, _MOST_SHARE), (_LEAST_LOST_P, _SURELY_LOST_P)))
     if _emptied(flight, phase):
-        lost = _SURELY_LOST
+        lost = _SURELY_LOST_P
     yield Finding(
         kind="commands",
         title=phase.title,
@@ -121,7 +121,7 @@ def _slow_phase(flight: Flight, phase: _Slow) -> Iterator[Finding]:
         ),
         source="POS, MODE, MSG; PARM",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         mission_lost=lost,
         parameters=(phase.parameter,),
         wanted=() if phase.parameter == _OVER_OBSTACLES else ((phase.parameter, default),),

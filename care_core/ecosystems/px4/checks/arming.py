@@ -17,9 +17,9 @@ from care_core.run import Setting, shown
 
 READS: Wanted = {STATUS: ("arming_state",), MESSAGES: ("message",)}
 LIMITS = Limits()
-_SURE = LIMITS.add("probability of what the vehicle says", 0.95, "", "the firmware says itself that this kept it so")
-_UNSAID = LIMITS.add("probability of a parameter where it says nothing", 0.3, "", "a choice: a part is as likely")
-_KEPT = LIMITS.add("probability that no mission is flown so", 1.0, "", "it does not arm")
+_SURE_P = LIMITS.add("probability of what the vehicle says", 0.95, "", "the firmware says itself that this kept it so")
+_UNSAID_P = LIMITS.add("probability of a parameter where it says nothing", 0.3, "", "a choice: a part is as likely")
+_KEPT_P = LIMITS.add("probability that no mission is flown so", 1.0, "", "it does not arm")
 
 _PLANNED_BY = frozenset(("GF_ACTION", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST", "MIS_DIST_1WP"))
 """What missions are planned by: a mission beyond it is refused at its default, too."""
@@ -47,8 +47,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         suspect="parameter" if named or is_unsaid else "operation",
         parameters=named,
         wanted=tuple((name, value) for name, value in asked.items() if value is not None),
-        probability=_UNSAID if is_unsaid else _SURE,
-        mission_lost=_KEPT,
+        probability=_UNSAID_P if is_unsaid else _SURE_P,
+        mission_lost=_KEPT_P,
     )
 
 

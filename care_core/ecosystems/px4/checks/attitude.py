@@ -17,7 +17,7 @@ READS: Wanted = upset.READS
 LIMITS = Limits()
 _LASTS_S = LIMITS.add("shortest time off its demand, all in all", 1.0, "s", "a choice: flicks of a stick take less")
 _CALM_S = LIMITS.add("pause that parts two such times", 5.0, "s", "a choice: what swings leaves it in turn")
-_OFF = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
+_OFF_P = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -40,7 +40,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         severity="warning",
         evidence=f"up to {most:.0f} degrees off it (limit {upset.LEFT_DEG:g}) in {end - start:.1f} s; it came back",
         source="vehicle_attitude, vehicle_attitude_setpoint",
-        probability=_OFF,
+        probability=_OFF_P,
     )
 
 

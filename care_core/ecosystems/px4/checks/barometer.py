@@ -20,8 +20,8 @@ _ROUGHER = LIMITS.add("noise over that before arming", 3.5, "", "a real quadcopt
 _ROUGH_M = LIMITS.add("noise", 0.5, "m", "second differences of sound ones have a middle of 0.05 to 0.8 m")
 _WINDOW = LIMITS.add("heights over which noise is taken", 25, "", "a choice: five seconds of a usual log")
 _STAYS = LIMITS.add("share of the flight after it", 0.7, "", "a choice: a broken sensor stays so, a gust does not")
-_TRUE = LIMITS.add("probability that it is so", 0.9, "", "training flights: 4 of 4, and none of 450 without")
-_LOSES = LIMITS.add("probability that a mission fails with it", 0.3, "", "training flights: 1 of 5")
+_TRUE_P = LIMITS.add("probability that it is so", 0.9, "", "training flights: 4 of 4, and none of 450 without")
+_LOSES_P = LIMITS.add("probability that a mission fails with it", 0.3, "", "training flights: 1 of 5")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -49,8 +49,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         severity="warning",
         evidence=f"its heights jump by {value:.1f} m from one to the next, by {usual_m:.1f} m before arming",
         source=f"{_TOPIC}.{_HEIGHT}",
-        probability=_TRUE,
-        mission_lost=_LOSES,
+        probability=_TRUE_P,
+        mission_lost=_LOSES_P,
     )
 
 

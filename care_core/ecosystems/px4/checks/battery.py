@@ -23,28 +23,32 @@ _CHARGED = LIMITS.add("charge at arming", 0.5, "of the battery", "a choice: a mi
 _DRAINED = LIMITS.add(
     "the same, of a log that begins armed", 0.15, "of the battery", "BAT_LOW_THR: it warns from there"
 )
-_TIRED = LIMITS.add("resistance of a cell", 30.0, "mOhm", "sound lithium cells have 2 to 10; old ones 20")
+_WORN_MOHM = LIMITS.add("resistance of a cell", 30.0, "mOhm", "sound lithium cells have 2 to 10; old ones 20")
 _LEAST_A = LIMITS.add("current from which it is told", 3.0, "A", "a choice: below it the voltage hardly falls")
 _LOADED_S = LIMITS.add("time after arming in which it is told", 20.0, "s", "a choice: the charge is still the same")
 _LOADED = LIMITS.add("current under load", 0.5, "of the most then", "a choice: motors that idle draw less")
-_EMPTY = LIMITS.add("probability that it was not charged", 0.9, "", "training flights: 6 of 6, and none of 460 without")
-_WORN = LIMITS.add("probability that it is worn", 0.85, "", "training flights: 3 of 3, and none of 460 without")
-_LOSES = LIMITS.add("probability that a mission fails with either", 0.9, "", "training flights: 9 of 9")
+_EMPTY_P = LIMITS.add(
+    "probability that it was not charged", 0.9, "", "training flights: 6 of 6, and none of 460 without"
+)
+_WORN_P = LIMITS.add("probability that it is worn", 0.85, "", "training flights: 3 of 3, and none of 460 without")
+_LOSES_P = LIMITS.add("probability that a mission fails with either", 0.9, "", "training flights: 9 of 9")
 _RAN_S = LIMITS.add("time in the air at its emergency level", 1.0, "s", "a choice: a gust draws it down for less")
 _DEEP_V = LIMITS.add("voltage of a cell in the air that is emptied", HARMED_V, "V", "lithium cells are damaged below")
-_RAN = LIMITS.add("probability that it ran down", 0.9, "", "the firmware's own word")
-_RAN_LOSES = LIMITS.add("probability that a mission fails as it runs down", 0.7, "", "a choice: it may have come home")
+_RAN_P = LIMITS.add("probability that it ran down", 0.9, "", "the firmware's own word")
+_RAN_LOSES_P = LIMITS.add(
+    "probability that a mission fails as it runs down", 0.7, "", "a choice: it may have come home"
+)
 _SHORT_V = LIMITS.add("voltage of a cell at rest that is none", 3.1, "V", "nobody takes off with cells as dead as that")
 _PER_CELL = (LIMITS.add("least voltage of a cell that is", LOW_V, "V", "an empty lithium cell at rest"),
              LIMITS.add("most voltage of a cell that is", HIGHEST_V, "V", "a full one: 4.2"))  # fmt: skip
-_CELLS = LIMITS.add("probability of a wrong number of cells", 0.7, "", "a choice: they may all be dead")
-_CELLS_LOSE = LIMITS.add("probability that it loses a mission", 0.05, "", "a choice: failsafes act too soon or late")
+_CELLS_P = LIMITS.add("probability of a wrong number of cells", 0.7, "", "a choice: they may all be dead")
+_CELLS_LOSE_P = LIMITS.add("probability that it loses a mission", 0.05, "", "a choice: failsafes act too soon or late")
 _BEGINS_S = LIMITS.add("time in which a log that begins armed tells of rest", 5.0, "s", "a choice: before it lifts")
 _HALF_V = LIMITS.add(
     "voltage of a cell at rest that is half full", 3.8, "V", "discharge curves of lithium polymer cells"
 )
 _LOADED_V = LIMITS.add("voltage of a cell under load that is sound", 3.5, "V", "BAT1_V_EMPTY as shipped before 1.14")
-_TOLD_LOW = LIMITS.add("probability that its charge was told too low", 0.9, "", "its voltage at rest says so")
+_TOLD_LOW_P = LIMITS.add("probability that its charge was told too low", 0.9, "", "its voltage at rest says so")
 _CRITICAL, _EMERGENCY = 2, 3
 """battery_status.warning."""
 _EMPTY_AT = ("BAT1_V_EMPTY", "BAT_V_EMPTY")
@@ -97,8 +101,8 @@ def _fewer_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
         ),
         source=f"{_TOPIC}.voltage_v; {name}",
         suspect="parameter",
-        probability=_CELLS,
-        mission_lost=_CELLS_LOSE,
+        probability=_CELLS_P,
+        mission_lost=_CELLS_LOSE_P,
         parameters=(name,),
         wanted=((name, float(fits[0])),),
     )
@@ -143,7 +147,7 @@ def _told_low(flight: Px4Flight) -> Iterator[Finding]:
         ),
         source=f"{_TOPIC}.voltage_v, current_a, warning; {name}",
         suspect="parameter",
-        probability=_TOLD_LOW,
+        probability=_TOLD_LOW_P,
         parameters=(name,) if name else (),
     )
 
@@ -171,8 +175,8 @@ def _ran_down(flight: Px4Flight) -> Iterator[Finding]:
             severity="critical" if deep else "warning",
             evidence=f"{volts:.1f} V at {float(flown['current_a'][low]):.0f} A at the least{a_cell}, in the air",
             source=f"{_TOPIC}.warning, voltage_v",
-            probability=_RAN,
-            mission_lost=_RAN_LOSES,
+            probability=_RAN_P,
+            mission_lost=_RAN_LOSES_P,
         )
         return
 
@@ -196,8 +200,8 @@ def _not_charged(before: Table, armed_s: float, least: float) -> Iterator[Findin
             severity="critical",
             evidence=f"it was to fly with {charge:.0%} of its charge, at {float(before['voltage_v'][-1]):.1f} V",
             source=f"{_TOPIC}.remaining",
-            probability=_EMPTY,
-            mission_lost=_LOSES,
+            probability=_EMPTY_P,
+            mission_lost=_LOSES_P,
         )
 
 
@@ -207,7 +211,7 @@ def _worn(before: Table, loaded: Table, cells: int, span: Span) -> Iterator[Find
         return
     amperes = float(median(loaded["current_a"])) - float(median(before["current_a"]))
     fall_v = float(median(before["voltage_v"])) - float(median(loaded["voltage_v"]))
-    if amperes < _LEAST_A or not (ohm := 1000 * fall_v / amperes / cells) > _TIRED:
+    if amperes < _LEAST_A or not (ohm := 1000 * fall_v / amperes / cells) > _WORN_MOHM:
         return
     yield Finding(
         kind="battery",
@@ -217,8 +221,8 @@ def _worn(before: Table, loaded: Table, cells: int, span: Span) -> Iterator[Find
         severity="critical",
         evidence=f"{fall_v:.1f} V at {amperes:.0f} A, {ohm:.0f} mOhm a cell; a sound one has 2 to 10",
         source=f"{_TOPIC}.voltage_v, current_a",
-        probability=_WORN,
-        mission_lost=_LOSES,
+        probability=_WORN_P,
+        mission_lost=_LOSES_P,
     )
 
 

@@ -13,8 +13,8 @@ from care_core.run import shown
 
 READS: Wanted = {}
 LIMITS = Limits()
-_SURE = LIMITS.add("probability of the calibration", 0.95, "", "no log of some 200 holds one, no simulator needs one")
-_LOSES = LIMITS.add("probability that a mission fails with it", 0.7, "", "a choice: some are flown, badly")
+_SURE_P = LIMITS.add("probability of the calibration", 0.95, "", "no log of some 200 holds one, no simulator needs one")
+_LOSES_P = LIMITS.add("probability that a mission fails with it", 0.7, "", "a choice: some are flown, badly")
 _SENSORS: tuple[tuple[str, str, FindingKind], ...] = (
     ("CAL_ACC", "an accelerometer", "imu"), ("CAL_GYRO", "a gyroscope", "imu"), ("CAL_MAG", "a compass", "compass"),
 )  # fmt: skip
@@ -40,8 +40,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
                 source="parameters CAL_*",
                 suspect="parameter",
                 parameters=tuple(one.name for one in off),
-                probability=_SURE,
-                mission_lost=_LOSES,
+                probability=_SURE_P,
+                mission_lost=_LOSES_P,
             )
 
 

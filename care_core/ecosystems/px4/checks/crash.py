@@ -29,9 +29,9 @@ _BY_THROTTLE = frozenset((0, 10, 15))
 _IDLES_S = LIMITS.add(
     "time before control is lost in which it is there", 0.4, "s", "a choice: who sees it tip is later"
 )
-_LOST = LIMITS.add("probability of gains, control lost", 0.85, "", "training flights: 14 of 15, else a motor")
-_STEERED = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
-_CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
+_LOST_P = LIMITS.add("probability of gains, control lost", 0.85, "", "training flights: 14 of 15, else a motor")
+_STEERED_P = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
+_CRASHED_P = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -49,7 +49,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
             evidence=f"the attitude is up to {lost.most_deg:.0f} deg off its target and does not recover{idle}",
             source=f"vehicle_attitude, vehicle_attitude_setpoint; above {LEFT_DEG:g} deg",
             suspect="operation" if idled else "parameter",
-            probability=_LOST,
+            probability=_LOST_P,
         )
     if hit is not None:
         stop = "stayed there" if hit.blow is None else f"felt a blow of {hit.blow:.0f} m/s^2"
@@ -64,7 +64,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
             evidence=f"it came down at {hit.speed_ms:.1f} m/s and {stop}{told}",
             source="vehicle_local_position.z, sensor_combined, manual_control_setpoint",
             suspect="operation" if steered else "hardware",
-            probability=_STEERED if steered else _CRASHED,
+            probability=_STEERED_P if steered else _CRASHED_P,
         )
 
 

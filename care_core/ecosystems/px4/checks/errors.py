@@ -12,8 +12,8 @@ from care_core.logs.base import Wanted
 
 READS: Wanted = {MESSAGES: ("level", "message")}
 LIMITS = Limits(repeated.LIMITS)
-_TRUE = LIMITS.add("probability of a part", 0.5, "", "a choice: of what no other check knows, nobody can tell")
-_LOSES = LIMITS.add("probability that a mission fails with it", 0.3, "", "a choice: many a rover drives on")
+_TRUE_P = LIMITS.add("probability of a part", 0.5, "", "a choice: of what no other check knows, nobody can tell")
+_LOSES_P = LIMITS.add("probability that a mission fails with it", 0.3, "", "a choice: many a rover drives on")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -28,8 +28,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
                 severity="warning",
                 evidence=f"{len(error.times)} times while armed",
                 source=MESSAGES,
-                probability=_TRUE,
-                mission_lost=_LOSES,
+                probability=_TRUE_P,
+                mission_lost=_LOSES_P,
             )
             return
 

@@ -16,20 +16,22 @@ _REJECTED = LIMITS.add(
     "innovation test ratio", 1.0, "", "EstimatorStatus.msg: EKF2 does not use a sensor whose ratio is above 1"
 )
 _SHORTEST_S = LIMITS.add("shortest rejection", 1.0, "s", "a choice: single outliers are what the test is for")
-_PLACE = LIMITS.add("probability of the GPS, position rejected", 0.85, "", "training flights: 5 of 5")
-_PLACE_LOST = LIMITS.add("probability that a mission fails so", 0.85, "", "training flights: 5 of 5")
-_COMPASS = LIMITS.add("probability of the compass, rejected", 0.8, "", "training flights: 2 of 2; as a disturbed field")
-_COMPASS_LOST = LIMITS.add("probability that it fails for a compass", 0.1, "", "training flights: 0 of 6")
+_PLACE_P = LIMITS.add("probability of the GPS, position rejected", 0.85, "", "training flights: 5 of 5")
+_PLACE_LOST_P = LIMITS.add("probability that a mission fails so", 0.85, "", "training flights: 5 of 5")
+_COMPASS_P = LIMITS.add(
+    "probability of the compass, rejected", 0.8, "", "training flights: 2 of 2; as a disturbed field"
+)
+_COMPASS_LOST_P = LIMITS.add("probability that it fails for a compass", 0.1, "", "training flights: 0 of 6")
 
 STATES = (
     State(_TOPIC, "vel_test_ratio", "estimator rejects velocity", "gps"),
     State(_TOPIC, "pos_test_ratio", "estimator rejects position", "gps",
-          probability=_PLACE, mission_lost=_PLACE_LOST),
+          probability=_PLACE_P, mission_lost=_PLACE_LOST_P),
     State(_TOPIC, "hgt_test_ratio", "estimator rejects height", "barometer"),
     State(_TOPIC, "mag_test_ratio", "estimator rejects compass", "compass",
-          probability=_COMPASS, mission_lost=_COMPASS_LOST),
+          probability=_COMPASS_P, mission_lost=_COMPASS_LOST_P),
     State(_TOPIC, "hdg_test_ratio", "estimator rejects heading", "compass",
-          probability=_COMPASS, mission_lost=_COMPASS_LOST),
+          probability=_COMPASS_P, mission_lost=_COMPASS_LOST_P),
 )  # fmt: skip
 """Newer firmware publishes the ratio of the heading, whatever gives it, in place of the compass's."""
 

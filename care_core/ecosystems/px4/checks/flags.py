@@ -14,20 +14,20 @@ _OLD_FLAGS, _ESTIMATOR = "vehicle_status_flags", "estimator_status_flags"
 
 LIMITS = Limits()  # the vehicle applies its own
 _FLIGHTS = "training flights"
-_LOW = LIMITS.add(
+_LOW_P = LIMITS.add(
     "probability of a battery that will not last", 0.1, "", f"{_FLIGHTS}: none of 10 whose battery shows nothing else"
 )
-_LOW_LOST = LIMITS.add("probability that a mission fails with such a battery", 0.9, "", f"{_FLIGHTS}: 17 of 19")
-_NOWHERE = LIMITS.add("probability of the GPS, no global position", 0.9, "", f"{_FLIGHTS}: 8 of 8")
-_NOWHERE_LOST = LIMITS.add("probability that a mission fails without one", 0.9, "", f"{_FLIGHTS}: 8 of 8")
-_TIPPED = LIMITS.add("probability of gains, attitude beyond limits", 0.85, "", f"{_FLIGHTS}: 17 of 20, else motors")
-_DISTURBED = LIMITS.add("probability of the compass, field disturbed", 0.85, "", f"{_FLIGHTS}: 4 of 4")
-_DISTURBED_LOST = LIMITS.add("probability that a mission fails in such a field", 0.1, "", f"{_FLIGHTS}: 0 of 6")
-_BUMPED = LIMITS.add(
+_LOW_LOST_P = LIMITS.add("probability that a mission fails with such a battery", 0.9, "", f"{_FLIGHTS}: 17 of 19")
+_NOWHERE_P = LIMITS.add("probability of the GPS, no global position", 0.9, "", f"{_FLIGHTS}: 8 of 8")
+_NOWHERE_LOST_P = LIMITS.add("probability that a mission fails without one", 0.9, "", f"{_FLIGHTS}: 8 of 8")
+_TIPPED_P = LIMITS.add("probability of gains, attitude beyond limits", 0.85, "", f"{_FLIGHTS}: 17 of 20, else motors")
+_DISTURBED_P = LIMITS.add("probability of the compass, field disturbed", 0.85, "", f"{_FLIGHTS}: 4 of 4")
+_DISTURBED_LOST_P = LIMITS.add("probability that a mission fails in such a field", 0.1, "", f"{_FLIGHTS}: 0 of 6")
+_BUMPED_P = LIMITS.add(
     "probability of a part, vertical accelerations", 0.1, "", f"{_FLIGHTS}: after falls; vibration has its own check"
 )
-_UNAIDED = LIMITS.add("probability of a part, no position aid", 0.8, "", f"{_FLIGHTS}: 8 of 9, all of the GPS")
-_UNAIDED_LOST = LIMITS.add("probability that a mission fails without it", 0.9, "", f"{_FLIGHTS}: 8 of 9")
+_UNAIDED_P = LIMITS.add("probability of a part, no position aid", 0.8, "", f"{_FLIGHTS}: 8 of 9, all of the GPS")
+_UNAIDED_LOST_P = LIMITS.add("probability that a mission fails without it", 0.9, "", f"{_FLIGHTS}: 8 of 9")
 
 STATES = (
     State(STATUS, "failsafe", "failsafe"),
@@ -39,28 +39,28 @@ STATES = (
     State(FLAGS, "gcs_connection_lost", "ground station lost", "radio", "info"),
     State(FLAGS, "battery_unhealthy", "battery unhealthy", "battery", "critical"),
     State(FLAGS, "battery_low_remaining_time", "battery will not last to reach home", "battery",
-          probability=_LOW, mission_lost=_LOW_LOST),
+          probability=_LOW_P, mission_lost=_LOW_LOST_P),
     State(FLAGS, "geofence_breached", "geofence breached"),
     State(FLAGS, "local_position_invalid", "no valid local position", "estimator"),
     State(FLAGS, "global_position_invalid", "no valid global position", "gps",
-          probability=_NOWHERE, mission_lost=_NOWHERE_LOST),
+          probability=_NOWHERE_P, mission_lost=_NOWHERE_LOST_P),
     State(FLAGS, "attitude_invalid", "no valid attitude", "estimator", "critical"),
     State(FLAGS, "angular_velocity_invalid", "no valid rotation rate", "imu", "critical"),
     State(FLAGS, "wind_limit_exceeded", "wind above its limit"),
     State(FLAGS, "fd_critical_failure", "attitude beyond the failure detector's limits", "attitude", "critical",
-          "parameter", _TIPPED),
+          "parameter", _TIPPED_P),
     State(FLAGS, "fd_motor_failure", "motor failure", "motor", "critical"),
     State(FLAGS, "fd_esc_arming_failure", "an ESC did not arm", "motor", "critical"),
     State(FLAGS, "fd_imbalanced_prop", "imbalanced propeller", "vibration"),
     State(_OLD_FLAGS, "condition_battery_healthy", "battery unhealthy", "battery", "critical"),
     State(_OLD_FLAGS, "vtol_transition_failure", "transition failed", "attitude"),
     State(_ESTIMATOR, "cs_mag_field_disturbed", "magnetic field disturbed", "compass",
-          probability=_DISTURBED, mission_lost=_DISTURBED_LOST),
+          probability=_DISTURBED_P, mission_lost=_DISTURBED_LOST_P),
     State(_ESTIMATOR, "cs_mag_fault", "compass given up by the estimator", "compass"),
     State(_ESTIMATOR, "cs_inertial_dead_reckoning", "estimator without position aid", "estimator",
-          probability=_UNAIDED, mission_lost=_UNAIDED_LOST),
+          probability=_UNAIDED_P, mission_lost=_UNAIDED_LOST_P),
     State(_ESTIMATOR, "fs_bad_acc_vertical", "vertical accelerations make no sense", "vibration",
-          probability=_BUMPED),
+          probability=_BUMPED_P),
     State(_ESTIMATOR, "fs_bad_acc_clipping", "accelerometers clip", "vibration"),
 )  # fmt: skip
 """msg/VehicleStatus.msg, FailsafeFlags.msg, VehicleStatusFlags.msg (to 1.13) and EstimatorStatusFlags.msg."""

@@ -31,7 +31,7 @@ _NO_MISSION = re.compile(r"no valid mission available", re.IGNORECASE)
 LIMITS = Limits()
 _IDLES = LIMITS.add("thrust that is asked for on the ground", 0.1, "", "MPC_THR_MIN is 0.12 as shipped")
 _WAITS_S = LIMITS.add("shortest time armed", 3.0, "s", "a choice: COM_SPOOLUP_TIME is 1 s as shipped, and margin")
-_SURE = LIMITS.add("probability that it was not begun", 0.9, "", "nothing was asked of the motors")
+_SURE_P = LIMITS.add("probability that it was not begun", 0.9, "", "nothing was asked of the motors")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -56,7 +56,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
                 + ("; the navigator calls the mission finished: upload it again, or start it anew" if done else ""),
                 source=f"{LANDED}, {_THRUST}, {RESULT}",
                 suspect="operation",
-                probability=_SURE,
+                probability=_SURE_P,
             )
             return
 
@@ -76,7 +76,7 @@ def _refused(flight: Px4Flight, span: Span) -> Finding | None:
         evidence=f"the firmware says: {first[1]}; upload the mission again, or start it anew",
         source=f"{MESSAGES}, {RESULT}",
         suspect="operation",
-        probability=_SURE,
+        probability=_SURE_P,
     )
 
 

@@ -49,10 +49,10 @@ _LIFTS = LIMITS.add("thrust that lifts", 0.4, "", "a choice: what hovers with le
 _DRAWS_W = LIMITS.add("power of a vehicle that lifts", 5.0, "W", "the lightest quadcopter, of 30 g, hovers with 7 W")
 _MEASURED_A = LIMITS.add("change of a current that is measured", 0.02, "A", "a choice: what is not measured stays")
 _FEWEST = 10
-_UNPOWERED = LIMITS.add("probability that the motors get no power", 0.95, "", "physics: lift takes power")
-_SET = LIMITS.add("probability of an end that is set", 0.9, "", "thrust stands at the very value that somebody set")
+_UNPOWERED_P = LIMITS.add("probability that the motors get no power", 0.95, "", "physics: lift takes power")
+_SET_P = LIMITS.add("probability of an end that is set", 0.9, "", "thrust stands at the very value that somebody set")
 _SET_BY = LIMITS.add("how far an end is set off its default", 0.1, "", "a choice: a tenth of the thrust is felt")
-_TRUE = LIMITS.add("probability of a part", 0.5, "", "a choice: a load, and how outputs are set, look the same")
+_TRUE_P = LIMITS.add("probability of a part", 0.5, "", "a choice: a load, and how outputs are set, look the same")
 
 
 class _End(NamedTuple):
@@ -99,7 +99,7 @@ def _set(flight: Px4Flight, one: Finding, end: str, way: float) -> Finding:
         evidence=f"{one.evidence}; {end} is {shown(setting.value)} (default {shown(setting.default)})",
         parameters=(end,),
         wanted=((end, float(setting.default)),),
-        probability=_SET,
+        probability=_SET_P,
     )
 
 
@@ -129,7 +129,7 @@ def _unpowered(flight: Px4Flight, lacking: Finding, drawn_w: float) -> Finding:
         evidence=f"{drawn_w:.1f} W while lift is asked for: no power at their controllers, or no propellers; "
         + lacking.evidence,
         source=f"{lacking.source}, {_BATTERY}.current_a",
-        probability=_UNPOWERED,
+        probability=_UNPOWERED_P,
     )
 
 
@@ -148,7 +148,7 @@ def _at_its_end(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator
             severity="warning",
             evidence=f"{what} for {stop - start:.0f} s: it {_goes(climbs, 's')}, and is to {_goes(wanted)}",
             source=f"{POSITION}.vz, {_WANTED}.vz, {_THRUST}",
-            probability=_TRUE,
+            probability=_TRUE_P,
         )
 
 

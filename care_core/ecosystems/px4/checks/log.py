@@ -18,7 +18,7 @@ LIMITS = Limits()
 _HIGH_M = LIMITS.add("height in the air", 2.0, "m", "a choice: estimates drift by less")
 _SINKS_MS = LIMITS.add("descent that is told", 3.0, "m/s", "a fall from half a metre; MPC_LAND_SPEED is 0.7")
 _LAST_S = LIMITS.add("end of the log over which it is taken", 0.5, "s", "a choice: what tumbles falls unsteadily")
-_ENDS = LIMITS.add("probability that power was lost", 0.2, "", "a choice: mostly somebody stopped the recording")
+_ENDS_P = LIMITS.add("probability that power was lost", 0.2, "", "a choice: mostly somebody stopped the recording")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -43,7 +43,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         + (f", coming down at {sinks:.1f} m/s" if sinks > _SINKS_MS else "")
         + " at the last record: power was lost, it hit the ground, or the recording was stopped",
         source=f"{POSITION}.z, vz; {LANDED}",
-        probability=_ENDS,
+        probability=_ENDS_P,
     )
 
 

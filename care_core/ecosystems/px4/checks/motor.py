@@ -23,9 +23,9 @@ _IDLE = LIMITS.add("output of motors that lift nothing", 0.06, "of the range", "
 _STOPPED_S = LIMITS.add("shortest stop in the air", 0.3, "s", "a choice: a descent keeps some thrust")
 _NEAR_S = LIMITS.add("time before control was lost", 2.0, "s", "it falls, then turns over")
 _FALLS_S = LIMITS.add("left out before control was lost", 0.5, "s", "a choice: it is driven to right the vehicle")
-_WEAK = LIMITS.add("probability that a motor driven harder is weak", 0.7, "", "as of ArduPilot: 9 of 12 such flights")
+_WEAK_P = LIMITS.add("probability that a motor driven harder is weak", 0.7, "", "as of ArduPilot: 9 of 12 such flights")
 _AT_LIMIT = LIMITS.add("output of a motor that can give no more", 0.97, "of the range", "a choice: outputs are rounded")
-_CUT = LIMITS.add("probability that the stop made it fall", 0.9, "", "what has no thrust falls")
+_CUT_P = LIMITS.add("probability that the stop made it fall", 0.9, "", "what has no thrust falls")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -92,7 +92,7 @@ def _weak(flight: Px4Flight, commands: Commands, until_s: float, lost: upset.Los
         severity="critical" if lost is not None or weak.share > _AT_LIMIT else "warning",
         evidence=f"it is asked for {weak.share:.0%} where the others are at {weak.others:.0%}; before, they were even",
         source="actuator_motors or actuator_outputs",
-        probability=_WEAK,
+        probability=_WEAK_P,
     )
 
 
@@ -124,7 +124,7 @@ def _all_stopped(flight: Px4Flight, stopped_s: float, lost: upset.Lost) -> Findi
         evidence=f"every output is at idle from {log_time(stopped_s)} on{up}{said}",
         source="actuator_motors or actuator_outputs, vehicle_land_detected",
         suspect="operation",
-        probability=_CUT,
+        probability=_CUT_P,
     )
 
 

@@ -24,7 +24,7 @@ READS: Wanted = {MESSAGES: ("message",)}
 LIMITS = Limits()
 _OFF_CENTRE = LIMITS.add("lift off the middle, as a share of the arms", 0.3, "", "a choice: a frame is nearly even")
 _TILTED = LIMITS.add("tilt of one rotor alone", 0.1, "", "a choice: 6 degrees; frames tilt all of theirs")
-_SURE = LIMITS.add("probability of the parameter", 0.95, "", "no frame is built so")
+_SURE_P = LIMITS.add("probability of the parameter", 0.95, "", "no frame is built so")
 _MULTIROTOR = 0
 """CA_AIRFRAME of all multicopters."""
 _FIELDS = ("PX", "PY", "AX", "AY", "AZ", "KM", "CT")
@@ -114,7 +114,7 @@ def _finding(flight: Px4Flight, title: str, evidence: str, off: Mapping[str, Set
         evidence=f"{evidence}: {values}",
         source="parameters CA_ROTORn_* and the functions of the outputs",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         parameters=tuple(off),
         wanted=tuple((name, float(one.default)) for name, one in off.items() if isinstance(one.default, (int, float))),
     )

@@ -21,7 +21,7 @@ _SPINS_S = LIMITS.add("shortest turn against its control", 2.0, "s", "a choice: 
 _GAP_S = LIMITS.add("pause that still counts as one turn", 0.5, "s", "a choice: the demand flickers around a target")
 _LIFTS = LIMITS.add("thrust that flies", 0.1, "", "MPC_THR_MIN is 0.12 as shipped; what is carried asks for none")
 _SPENT = LIMITS.add("thrust with nothing left", 0.9, "", "a choice: lift comes before heading in the mixer")
-_HELD = LIMITS.add("probability of a part", 0.3, "", "a choice: what holds or strikes it shows alike")
+_HELD_P = LIMITS.add("probability of a part", 0.3, "", "a choice: what holds or strikes it shows alike")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -57,7 +57,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
             f"(limit {_SPINS_DPS:g}): {why}"
         ),
         source=f"{_RATE}.xyz[2], {_ASKED}.yaw",
-        probability=_HELD,
+        probability=_HELD_P,
     )
 
 

@@ -26,8 +26,8 @@ _APART = LIMITS.add("output of one turning direction above the other", 0.2, "of 
 _SPENT = LIMITS.add("output with little left", 0.75, "of the range", "a choice: gusts and climbs take a fifth")
 _FLOWN_S = LIMITS.add("shortest flight", 10.0, "s", "a choice: a take-off turns it, too")
 _FEWEST = 4
-_TRUE = LIMITS.add("probability of a part", 0.6, "", "a choice: a wrong sign of CA_ROTORn_KM looks the same")
-_LOST = LIMITS.add("probability that it costs the mission", 0.5, "", "a choice: it flies, with little lift left")
+_TRUE_P = LIMITS.add("probability of a part", 0.6, "", "a choice: a wrong sign of CA_ROTORn_KM looks the same")
+_LOST_P = LIMITS.add("probability that it costs the mission", 0.5, "", "a choice: it flies, with little lift left")
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -61,8 +61,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
             "twists it, such as a crooked motor, a wrong propeller or a bent frame"
         ),
         source="actuator_motors or actuator_outputs, CA_ROTORn_KM",
-        probability=_TRUE,
-        mission_lost=_LOST,
+        probability=_TRUE_P,
+        mission_lost=_LOST_P,
     )
 
 

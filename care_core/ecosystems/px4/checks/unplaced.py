@@ -14,7 +14,7 @@ from care_core.logs.base import Wanted, merge_needs
 
 READS: Wanted = merge_needs((failsafes.READS, {STATUS: ("failsafe",)}))
 LIMITS = Limits()
-_SURE = LIMITS.add("probability that the mode was the mistake", 0.9, "", "the firmware's own flags, up all along")
+_SURE_P = LIMITS.add("probability that the mode was the mistake", 0.9, "", "the firmware's own flags, up all along")
 _UNKNOWN = {"local_position_invalid": "no local position", "global_position_invalid": "no global position"}
 
 
@@ -44,7 +44,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
                 + ("" if fallback is None else f", and falls back to {mode_name('px4', int(fallback))}"),
                 source=f"{FLAGS}, {STATUS}.{failsafes.INTENDED}",
                 suspect="operation",
-                probability=_SURE,
+                probability=_SURE_P,
             )
             return
 

@@ -23,7 +23,7 @@ LIMITS = Limits()
 _LASTS_S = LIMITS.add("shortest time of it", 2.0, "s", "a choice: a hard landing is over sooner")
 _SEVERE = LIMITS.add("critical vibration or noise, in limits", 2.0, "", "a choice: real quadcopters fly at one limit")
 _LATE_S = LIMITS.add("time by which a record comes late", 1.5, "s", "it is of the second before it")
-_TRUE = LIMITS.add("probability that it is so", 0.9, "", "training flights: 17 of 17, and none of 450 without")
+_TRUE_P = LIMITS.add("probability that it is so", 0.9, "", "training flights: 17 of 17, and none of 450 without")
 
 
 class _Metric(Record):
@@ -75,7 +75,7 @@ def _shaken(flight: Px4Flight, imu: str, metric: _Metric, upset_s: float) -> Fin
         severity="critical" if value > _SEVERE * metric.limit else "warning",
         evidence=f"{value:.2g} {metric.unit} in the {metric.what}' vibration metric; {metric.limit:g} is too much",
         source=f"{imu}.{metric.field}",
-        probability=_TRUE,
+        probability=_TRUE_P,
     )
 
 

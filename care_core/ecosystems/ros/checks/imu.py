@@ -27,7 +27,7 @@ TIP_DEG = LIMITS.add(
 LEAST_MPS2 = LIMITS.add("least usual acceleration", 7.8, "m/s2", "gravity, 9.8, less a badly scaled sensor's error")
 MOST_MPS2 = LIMITS.add("greatest usual acceleration", 11.8, "m/s2", "gravity and a badly scaled sensor's error")
 BEFORE_S = LIMITS.add("shocks that belong to a fall come so long before", 3.0, "s", "a choice: a robot tips in one")
-_ASIDE = LIMITS.add(
+_ASIDE_P = LIMITS.add(
     "probability that an acceleration in other units costs the mission", 0.05, "", "few filters fuse it"
 )
 MESSAGES_FELT = LIMITS.add("messages of an IMU", 50, "", "fewer do not tell what is usual")
@@ -64,7 +64,7 @@ def _in_g(drive: Drive) -> Iterator[Finding]:
                 source=f"{topic}; REP 103: SI units",
                 suspect="parameter",
                 probability=0.9,
-                mission_lost=_ASIDE,
+                mission_lost=_ASIDE_P,
             )
             return
 

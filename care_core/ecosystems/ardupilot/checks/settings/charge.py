@@ -37,11 +37,11 @@ _ANSWERS_A = LIMITS.add(
     "current that flying takes more than standing", 0.5, "A", "a choice: the smallest takes several"
 )
 _FEWEST, _LANDED = 20, 2
-_SURE = LIMITS.add("probability of a pin with no sensor on it", 0.9, "", "motors that turn draw a current")
-_LIKELY = LIMITS.add(
+_SURE_P = LIMITS.add("probability of a pin with no sensor on it", 0.9, "", "motors that turn draw a current")
+_LIKELY_P = LIMITS.add(
     "probability of a wrong scale of the current", 0.8, "", "a choice: BATT_CAPACITY may be wrong instead"
 )
-_LOST = LIMITS.add("probability that it costs the mission", 0.05, "", "0 of 2 flights at half and twice failed")
+_LOST_P = LIMITS.add("probability that it costs the mission", 0.05, "", "0 of 2 flights at half and twice failed")
 _AS_PER_MAH = 3.6
 
 
@@ -74,7 +74,7 @@ def _no_sensor(flight: Flight, table: Table) -> Finding | None:
         flight, "BATT_CURR_PIN", pin, "the battery's current does not answer to the motors",
         f"flying takes {more:.2f} A more than standing (limit {_ANSWERS_A:g}) with "
         f"BATT_CURR_PIN={shown(flight.setting('BATT_CURR_PIN'))} (default {shown(pin)})",
-        "BAT.Curr in flight and before arming", _SURE,
+        "BAT.Curr in flight and before arming", _SURE_P,
     )  # fmt: skip
 
 
@@ -94,7 +94,7 @@ def _wrong_scale(flight: Flight, battery: Battery, table: Table) -> Finding | No
         f"{drawn:.0f} mAh is {100 * drawn / capacity:.0f} % of BATT_CAPACITY {capacity:g}, and the voltage at rest "
         f"says that {100 * used:.0f} % were used (limits {_LEAST:g} and {_MOST:g} times that), with BATT_AMP_PERVLT="
         f"{scale:.4g} (default {default:.4g}, at which it would be {100 * drawn / capacity * default / scale:.0f} %)",
-        "BAT.Curr over the flight against BAT.Volt before and after it", _LIKELY,
+        "BAT.Curr over the flight against BAT.Volt before and after it", _LIKELY_P,
     )  # fmt: skip
 
 
@@ -123,7 +123,7 @@ def _finding(
         source=source,
         suspect="parameter",
         probability=probability,
-        mission_lost=_LOST,
+        mission_lost=_LOST_P,
         parameters=(parameter,),
         wanted=((parameter, wanted),),
     )

@@ -35,7 +35,7 @@ _AGAINST = LIMITS.add(
     "correlation of steering and turn rate", -0.7, "", "-0.1 and more in 270 drives, -0.97 of a reversed one"
 )
 _WAITS_S = LIMITS.add("time for which it waits", 60.0, "s", "a choice: who sets it off walks up to it and pushes")
-_SURE = LIMITS.add("probability of the parameter", 0.95, "", "no other explains the sign or the wait")
+_SURE_P = LIMITS.add("probability of the parameter", 0.95, "", "no other explains the sign or the wait")
 
 _AUTO = 10
 """Number of the mode that runs missions (Rover/mode.h)."""
@@ -142,7 +142,7 @@ def _finding(flight: Flight, name: str, wanted: float | None, span: Span, title:
         evidence=f"{shown}: {name} is {0.0 if value is None else value:g}",
         source="THR, STER; PARM",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         parameters=(name,),
         wanted=() if wanted is None else ((name, wanted),),
     )

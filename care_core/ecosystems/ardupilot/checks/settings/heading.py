@@ -52,7 +52,7 @@ _BETTER = LIMITS.add(
 _UNTOUCHED_S = LIMITS.add(
     "shortest flight that tells against a mounting that nobody changed", 60.0, "s", "a choice: few leans are chance"
 )
-_SURE = LIMITS.add("probability that undoing it mends", 0.95, "", "no other parameter brings the compass back")
+_SURE_P = LIMITS.add("probability that undoing it mends", 0.95, "", "no other parameter brings the compass back")
 _NEAR = LIMITS.add("measured value that is the default", 0.05, "", "a choice: a share of the field")
 _FEWEST, _ROUNDED = 3, 0.01
 _TILTED = 0.05
@@ -84,7 +84,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence=undone.evidence,
             source="MAG; ATT and GPS for the course",
             suspect="parameter",
-            probability=_SURE,
+            probability=_SURE_P,
             parameters=(undone.parameter,),
             wanted=((undone.parameter, undone.wanted),),
         )

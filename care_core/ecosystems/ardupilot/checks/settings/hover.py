@@ -39,14 +39,16 @@ _RAISED = LIMITS.add(
 )
 _HOVER = LIMITS.add("times MOT_THST_HOVER that hovering takes", 1.6, "", "a choice: loads and winds take less")
 _EDGE_S, _FEWEST = 4.0, 20
-_SURE = LIMITS.add("probability that what ends the outputs keeps it down", 0.9, "", "both flights that stayed down so")
+_SURE_P = LIMITS.add(
+    "probability that what ends the outputs keeps it down", 0.9, "", "both flights that stayed down so"
+)
 _TOO_LITTLE = LIMITS.add(
     "range of the outputs that surely keeps it down", 0.65, "", "the flights that stayed down so had 0.6 to 0.65"
 )
 _UNSURE = LIMITS.add("the same where nearly all is left", 0.2, "", "0.75 flew where no motor was weak")
-_GAIN = LIMITS.add("probability of a raised gain", 0.8, "", "a choice: no healthy flight swings so")
-_FEEDS = LIMITS.add("probability of a hover throttle that is wrong", 0.9, "", "it is measured")
-_FEEDS_LOST = LIMITS.add("probability that it costs the mission", 0.02, "", "0 of 4 flights at half and twice failed")
+_GAIN_P = LIMITS.add("probability of a raised gain", 0.8, "", "a choice: no healthy flight swings so")
+_FEEDS_P = LIMITS.add("probability of a hover throttle that is wrong", 0.9, "", "it is measured")
+_FEEDS_LOST_P = LIMITS.add("probability that it costs the mission", 0.02, "", "0 of 4 flights at half and twice failed")
 _GAINS = (
     "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D", "PSC_ACCZ_FF", "PSC_ACCZ_D_FF", "PSC_VELZ_P", "PSC_VELZ_I", "PSC_VELZ_D",
     "PSC_POSZ_P",
@@ -84,7 +86,7 @@ def _kept_down(flight: Flight) -> Iterator[Finding]:
 
 def keeps_down(kept: Kept) -> float:
     """How probable it is that a copter which spends all that its motors have lacks what this takes."""
-    return float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE, _UNSURE)))
+    return float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE_P, _UNSURE)))
 
 
 def ended(flight: Flight) -> Kept | None:
@@ -155,7 +157,7 @@ def _swings(flight: Flight) -> Iterator[Finding]:
             ),
             source="CTUN.ThO",
             suspect="parameter",
-            probability=_GAIN,
+            probability=_GAIN_P,
             parameters=tuple(raised),
         )
 
@@ -186,8 +188,8 @@ def _hovers_elsewhere(flight: Flight) -> Iterator[Finding]:
             evidence=f"hovering takes {hover:.2f}, MOT_THST_HOVER={value:g}, and MOT_HOVER_LEARN=0 learns none",
             source="CTUN.ThO",
             suspect="parameter",
-            probability=_FEEDS,
-            mission_lost=_FEEDS_LOST,
+            probability=_FEEDS_P,
+            mission_lost=_FEEDS_LOST_P,
             parameters=("MOT_THST_HOVER",),
             wanted=(("MOT_THST_HOVER", round(hover, 2)),),
         )

@@ -38,8 +38,8 @@ _TURNED_DEG = LIMITS.add(
     "gravity off the bottom of a board", 60.0, "deg", "a choice: nothing takes off from such a slope"
 )
 _NEAR_RAD = LIMITS.add("measured trim that is the default", 0.02, "rad", "a choice: a degree")
-_SURE = LIMITS.add("probability that undoing it mends", 0.95, "", "no other parameter brings it back")
-_TRIM_LOST = LIMITS.add(
+_SURE_P = LIMITS.add("probability that undoing it mends", 0.95, "", "no other parameter brings it back")
+_TRIM_LOST_P = LIMITS.add(
     "probability that a trim costs the mission", 0.15, "", "0 of 4 flights with 6 to 10 degrees failed"
 )
 
@@ -71,7 +71,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         evidence=undone.evidence,
         source=undone.source,
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         mission_lost=undone.mission_lost,
         parameters=(undone.parameter,),
         wanted=((undone.parameter, undone.wanted),),
@@ -184,7 +184,7 @@ def _trimmed(flight: Flight) -> Undone | None:
                     f"accelerometers lie level, with {name}={value:.4g}"
                 ),
                 source=f"ATT.{angle} and IMU before take-off",
-                mission_lost=_TRIM_LOST,
+                mission_lost=_TRIM_LOST_P,
             )
     return None
 

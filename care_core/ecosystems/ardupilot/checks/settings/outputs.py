@@ -57,10 +57,10 @@ _LACKS_FOR = LIMITS.add(
 )
 _TIMES = LIMITS.add("times the tightest turn that TURN_RADIUS is off", 2.0, "", "a choice: loads and ground change it")
 _ASKED = LIMITS.add("share of its travel that the steering used", 0.3, "", "a choice: what is steered less tells less")
-_SURE = LIMITS.add("probability of a trim", 0.95, "", "it is measured")
-_ENDS = LIMITS.add("probability of an end", 0.85, "", "a choice: a weak motor would need it, too")
-_RADIUS = LIMITS.add("probability of TURN_RADIUS", 0.9, "", "it is measured")
-_RADIUS_LOST = LIMITS.add("probability that it costs the mission", 0.3, "", "a choice: corners alone suffer")
+_SURE_P = LIMITS.add("probability of a trim", 0.95, "", "it is measured")
+_ENDS_P = LIMITS.add("probability of an end", 0.85, "", "a choice: a weak motor would need it, too")
+_RADIUS_P = LIMITS.add("probability of TURN_RADIUS", 0.9, "", "it is measured")
+_RADIUS_LOST_P = LIMITS.add("probability that it costs the mission", 0.3, "", "a choice: corners alone suffer")
 
 _MIDDLE_US = 1500.0
 
@@ -229,7 +229,7 @@ def _trim_finding(one: Neutral, drive: _Drive) -> Finding:
         ),
         source="RCOU against STER.TurnRate and THR.Speed; PARM",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         parameters=(one.parameter,),
         wanted=((one.parameter, one.wanted),),
     )
@@ -268,7 +268,7 @@ def _end_finding(drive: _Drive, name: str, value: float, default: float, share: 
         ),
         source="RCOU, THR, STER; PARM",
         suspect="parameter",
-        probability=_ENDS,
+        probability=_ENDS_P,
         parameters=(name,),
         wanted=((name, default),),
     )
@@ -302,8 +302,8 @@ def _radius(flight: Flight, drive: _Drive) -> Iterator[Finding]:
         ),
         source="RCOU against STER.TurnRate and THR.Speed; PARM",
         suspect="parameter",
-        probability=_RADIUS,
-        mission_lost=_RADIUS_LOST,
+        probability=_RADIUS_P,
+        mission_lost=_RADIUS_LOST_P,
         parameters=("TURN_RADIUS",),
         wanted=(("TURN_RADIUS", float(f"{tightest:.2g}")),),
     )

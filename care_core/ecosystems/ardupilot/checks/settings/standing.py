@@ -35,8 +35,10 @@ _STANDS_DPS = LIMITS.add("turn rate of a rover that stands", 2.0, "deg/s", "a ch
 _AS_LONG = LIMITS.add("share of the delay by which a stand differs", 0.1, "", "a choice: it slows down and speeds up")
 _PIVOT_S = LIMITS.add("shortest delay that is told", 3.0, "s", "a choice: shorter ones are lost among the stops")
 _LONG = LIMITS.add("share of the drive that loses the mission", 0.2, "", "missions are given 1.3 times their time")
-_SURE = LIMITS.add("probability of the parameter", 0.95, "", "it is measured")
-_LOST = LIMITS.add("probability that shorter stands lose it", 0.3, "", "a choice: most missions have the time for them")
+_SURE_P = LIMITS.add("probability of the parameter", 0.95, "", "it is measured")
+_LOST_P = LIMITS.add(
+    "probability that shorter stands lose it", 0.3, "", "a choice: most missions have the time for them"
+)
 _DRIVES = frozenset((STEERING, THROTTLE, LEFT, RIGHT))
 _MIDDLE_US = 1500.0
 _DELAY = "WP_PIVOT_DELAY"
@@ -73,7 +75,7 @@ def _driven_off(flight: Flight) -> Iterator[Finding]:
         evidence=f"for {sum(b - a for a, b in spans):.0f} s, at up to {speed:.1f} m/s (limit {_MOVES_S:g} s): {values}",
         source="RCOU, THR.Speed, STER.TurnRate; PARM",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         parameters=tuple(names),
         wanted=tuple((name, _MIDDLE_US) for name in names),
     )
@@ -111,8 +113,8 @@ def _waits(flight: Flight) -> Iterator[Finding]:
         ),
         source="THR.Speed, STER.TurnRate; PARM",
         suspect="parameter",
-        probability=_SURE,
-        mission_lost=None if is_long else _LOST,
+        probability=_SURE_P,
+        mission_lost=None if is_long else _LOST_P,
         parameters=(_DELAY,),
         wanted=((_DELAY, default),),
     )

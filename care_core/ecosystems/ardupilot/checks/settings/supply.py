@@ -44,8 +44,8 @@ _ADVISED = {
 _LEFT = LIMITS.add("cell under load that holds much charge", LOW_V, "V", "ArduPilot, Battery Failsafe: low at 3.5 V")
 _MOST_USED = LIMITS.add("share of the capacity used by then", 0.6, "", "a choice: a fifth is a usual reserve")
 _SLACK = LIMITS.add("charge that a threshold is met by", 0.03, "", "a choice: records are rounded")
-_SURE = LIMITS.add("probability of a wrong scale", 0.95, "", "no pack reads so, and one at the default scale does")
-_ACTED = LIMITS.add(
+_SURE_P = LIMITS.add("probability of a wrong scale", 0.95, "", "no pack reads so, and one at the default scale does")
+_ACTED_P = LIMITS.add(
     "probability of the threshold that acted", 0.9, "", "the firmware's own word, and a pack that was well"
 )
 LOW_VOLT = ("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT")
@@ -133,7 +133,7 @@ def _scale_finding(flight: Flight, parameter: str, wanted: float, rest: float, e
         evidence=evidence + (f"; battery failsafe at {log_time(failsafe)}" if failsafe is not None else ""),
         source="BAT.Volt before take-off; voltages of lithium polymer cells",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         mission_lost=None if harmed else 0.05,
         parameters=(parameter,),
         wanted=((parameter, wanted),),
@@ -164,7 +164,7 @@ def not_measured(flight: Flight) -> Finding | None:
         + (f", and {rests} rests on it" if rests else ""),
         source="BAT; BATT_MONITOR",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         parameters=("BATT_MONITOR",),
         wanted=(("BATT_MONITOR", default),),
     )
@@ -198,7 +198,7 @@ def wrong_current(flight: Flight) -> Finding | None:
         ),
         source="BAT.Curr before arming",
         suspect="parameter",
-        probability=_SURE,
+        probability=_SURE_P,
         parameters=("BATT_AMP_OFFSET",),
         wanted=(("BATT_AMP_OFFSET", wanted),),
     )
@@ -233,7 +233,7 @@ def _by_charge(
         f"{name}={reserve:g}{_default(flight, name)} acted with {used:.0f} of {capacity:.0f} mAh used, while the pack "
         f"still held {volts:.1f} V, {volts / battery.cells:.2f} V for each of {battery.cells} cells"
     )
-    return name, evidence, _ACTED
+    return name, evidence, _ACTED_P
 
 
 def _by_voltage(flight: Flight, level: str, volts: float, battery: Battery) -> tuple[str, str, float] | None:
@@ -248,7 +248,7 @@ def _by_voltage(flight: Flight, level: str, volts: float, battery: Battery) -> t
         f"was full; {name}={limit:g}{_default(flight, name)} asks for it at {limit / battery.cells:.2f} V a cell, "
         f"{_USUAL[level]} is usual"
     )
-    return name, evidence, _ACTED * min(1.0, (limit / battery.cells - _ADVISED[level]) / _WELL_ABOVE_V)
+    return name, evidence, _ACTED_P * min(1.0, (limit / battery.cells - _ADVISED[level]) / _WELL_ABOVE_V)
 
 
 def _default(flight: Flight, name: str) -> str:

@@ -38,9 +38,11 @@ _PACK = LIMITS.add("cell of a pack that was charged", CHARGED_V, "V", "cells of 
 _FULL_LEAST = LIMITS.add(f"full cell that {_FULL} may mean, least", 3.9, "V", "lithium ion: 4.1 V, iron: less")
 _FULL_MOST = LIMITS.add(f"full cell that {_FULL} may mean, most", 4.5, "V", "cells of high voltage: 4.35 V")
 _EMPTY_MOST = LIMITS.add(f"empty cell that {_EMPTY} may mean, most", 3.8, "V", "ArduPilot: 3.3 V; 3.5 V is used")
-_SURE = LIMITS.add("probability of what the thrust is scaled by wrongly", 0.9, "", "it is measured")
-_LOST = LIMITS.add("probability that a voltage costs the mission", 0.02, "", "0 of 4 flights at half and twice failed")
-_CURVE_LOST = LIMITS.add(
+_SURE_P = LIMITS.add("probability of what the thrust is scaled by wrongly", 0.9, "", "it is measured")
+_LOST_P = LIMITS.add(
+    "probability that a voltage costs the mission", 0.02, "", "0 of 4 flights at half and twice failed"
+)
+_CURVE_LOST_P = LIMITS.add(
     "probability that the curve costs the mission",
     0.1,
     "",
@@ -141,8 +143,8 @@ def _finding(flight: Flight, parameter: str, wanted: float, title: str, evidence
         evidence=evidence,
         source="CTUN.ThO, PSCD.AD" if parameter == _EXPO else "BAT.Volt before take-off; PARM",
         suspect="parameter",
-        probability=_SURE,
-        mission_lost=_CURVE_LOST if parameter == _EXPO else _LOST,
+        probability=_SURE_P,
+        mission_lost=_CURVE_LOST_P if parameter == _EXPO else _LOST_P,
         parameters=(parameter,),
         wanted=((parameter, wanted),),
     )

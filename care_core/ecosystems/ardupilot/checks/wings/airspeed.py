@@ -39,9 +39,9 @@ _SLOW = LIMITS.add(
 )
 _SLOW_S = LIMITS.add("shortest time so slow", 2.0, "s", "a choice: a gust is over sooner")
 _SINKS_MS = LIMITS.add("sink of a stall", 3.0, "m/s", "a choice: TECS_SINK_MIN is 2 as shipped")
-_FAILED = LIMITS.add("probability of a sensor that was given up", 0.9, "", "the firmware's own word")
-_LOST = LIMITS.add("probability that it costs the mission", 0.2, "", "0 of 3 training flights: it flies on without")
-_STALLS = LIMITS.add("probability of a part, in a stall", 0.3, "", "a choice: speeds and gains make it stall as well")
+_FAILED_P = LIMITS.add("probability of a sensor that was given up", 0.9, "", "the firmware's own word")
+_LOST_P = LIMITS.add("probability that it costs the mission", 0.2, "", "0 of 3 training flights: it flies on without")
+_STALLS_P = LIMITS.add("probability of a part, in a stall", 0.3, "", "a choice: speeds and gains make it stall as well")
 _HIGH_M = 15.0
 SENSOR_FAILED = "the airspeed sensor failed"
 _FAILS = re.compile(r"Airspeed sensor \d+ failure\. Disabling")
@@ -87,8 +87,8 @@ def _given_up(flight: Flight, sensor: Table, moved: Table) -> Iterator[Finding]:
             f"{float(np.interp(start, t, read)):.1f} m/s at {ground:.0f} m/s over ground"
         ),
         source="ARSP.Airspeed, U, H against GPS.Spd",
-        probability=_FAILED,
-        mission_lost=_LOST,
+        probability=_FAILED_P,
+        mission_lost=_LOST_P,
     )
 
 
@@ -105,8 +105,8 @@ def _said_to_fail(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence=f"the firmware says: {said[0][1]}{often}",
             source="MSG; AP_Airspeed_Health.cpp",
-            probability=_FAILED,
-            mission_lost=_LOST,
+            probability=_FAILED_P,
+            mission_lost=_LOST_P,
         )
 
 
@@ -133,7 +133,7 @@ def _stall(flight: Flight) -> Iterator[Finding]:
             f"sinking at {float(np.max(sinks[held])):.1f} m/s"
         ),
         source="CTUN.As, the height",
-        probability=_STALLS,
+        probability=_STALLS_P,
     )
 
 

@@ -26,9 +26,9 @@ _KEPT = LIMITS.add("range of the outputs that is left", 0.9, "", "a choice: a sh
 _TOO_LITTLE = LIMITS.add(
     "range of the outputs that surely keeps it down", 0.65, "", "none of the simulated ones flew so"
 )
-_SURE = LIMITS.add("probability that what ends the outputs keeps it down", 0.9, "", "as a copter's")
+_SURE_P = LIMITS.add("probability that what ends the outputs keeps it down", 0.9, "", "as a copter's")
 _UNSURE = LIMITS.add("the same where nearly all is left", 0.2, "", "as a copter's")
-_PART = LIMITS.add("probability of a part where nothing ends them", 0.5, "", "a choice: a load looks the same")
+_PART_P = LIMITS.add("probability of a part where nothing ends them", 0.5, "", "a choice: a load looks the same")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -52,7 +52,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         evidence=f"{end - start:.0f} s of all the thrust that the lift motors may give without rising{ended}",
         source="QTUN.ThO, height; PARM",
         suspect="hardware" if kept is None else "parameter",
-        probability=_PART if kept is None else float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE, _UNSURE))),
+        probability=_PART_P if kept is None else float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE_P, _UNSURE))),
         parameters=() if kept is None else (kept.parameter,),
         wanted=() if kept is None else ((kept.parameter, kept.wanted),),
     )

@@ -29,7 +29,7 @@ _PULLS = LIMITS.add("throttle at which the current tells", 0.3, "", "a choice: l
 _DROP = LIMITS.add("current for its throttle, as a share of before", 0.65, "", "simulated sound motors: 0.93 to 1.08")
 _LASTS_S = LIMITS.add("shortest time of a lesser current", 5.0, "s", "a choice: a dive is over sooner")
 _ENOUGH_A = LIMITS.add("current that tells", 1.0, "A", "a choice: sensors have an offset")
-_FAILED = LIMITS.add("probability of the motor", 0.9, "", "none of 300 sound flights")
+_FAILED_P = LIMITS.add("probability of the motor", 0.9, "", "none of 300 sound flights")
 _UNDER_WAY = LIMITS.add("speed, as a share of the usual, at which it tells", 0.6, "", "a choice: at rest it takes more")
 _BEFORE = 10
 
@@ -65,7 +65,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             f"(limit {_DROP:g} of it)"
         ),
         source="BAT.Curr, CTUN.ThO",
-        probability=_FAILED,
+        probability=_FAILED_P,
         mission_lost=0.7,
     )
 

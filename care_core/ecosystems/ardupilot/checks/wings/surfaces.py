@@ -39,10 +39,10 @@ _STOP = LIMITS.add("surface at its stop", 0.85, "of its travel", "a choice: what
 _STOP_S = LIMITS.add("shortest time at the stop", 5.0, "s", "a choice: a turn is over sooner")
 _LACKS_DPS = LIMITS.add("rate that is lacking at the stop", 4.0, "deg/s", "a choice: three times the noise of a rate")
 _ONE_SIDE = LIMITS.add("mean of a surface over its size", 0.6, "", "a choice: what swings goes both ways")
-_WRONG_WAY = LIMITS.add(
+_WRONG_WAY_P = LIMITS.add(
     "probability of a surface that turns it the wrong way", 0.9, "", "all 6 of 313 simulated flights that are turned so"
 )
-_STUCK = LIMITS.add(
+_STUCK_P = LIMITS.add(
     "probability of one at its stop", 0.3, "", "4 of 14 simulated flights: gains, limits and a stall hold it there, too"
 )
 _FLOWN_S = LIMITS.add(
@@ -146,8 +146,8 @@ def _wrong_way(surface: _Surface, flown: _Flown) -> Finding | None:
             )
         ),
         source=f"AETR.{surface.output}, {surface.controller}.Tar, Act, ATT.{surface.attitude}",
-        probability=_WRONG_WAY,
-        mission_lost=_WRONG_WAY,
+        probability=_WRONG_WAY_P,
+        mission_lost=_WRONG_WAY_P,
     )
 
 
@@ -207,7 +207,7 @@ def _at_its_stop(flight: Flight, surface: _Surface, flown: _Flown) -> Finding | 
             f"deg/s are lacking (limit {_LACKS_DPS:g})"
         ),
         source=f"AETR.{surface.output}, {surface.controller}.Tar, Act",
-        probability=_STUCK,
+        probability=_STUCK_P,
     )
 
 

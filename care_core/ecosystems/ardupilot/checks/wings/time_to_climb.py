@@ -12,8 +12,8 @@ from care_core.logs.base import Wanted
 READS: Wanted = {}
 
 LIMITS = Limits()
-_LIMITED = LIMITS.add("probability of the time limit", 0.7, "", "a choice: else it climbs too slowly")
-_STOPS = LIMITS.add("probability that a mission fails of it", 0.95, "", "it lands, and the mission is not flown")
+_LIMITED_P = LIMITS.add("probability of the time limit", 0.7, "", "a choice: else it climbs too slowly")
+_STOPS_P = LIMITS.add("probability that a mission fails of it", 0.95, "", "it lands, and the mission is not flown")
 _TEXT = "Failed to complete takeoff within time limit"
 _SCALE = "Q_TKOFF_FAIL_SCL"
 
@@ -36,8 +36,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         ),
         source=f"MSG; {_SCALE}: ArduPlane/quadplane.cpp",
         suspect="parameter",
-        probability=_LIMITED,
-        mission_lost=_STOPS,
+        probability=_LIMITED_P,
+        mission_lost=_STOPS_P,
         parameters=(_SCALE,),
     )
 

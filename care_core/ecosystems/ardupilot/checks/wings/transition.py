@@ -20,7 +20,7 @@ READS: Wanted = {}
 
 LIMITS = Limits()
 _SPEEDS_UP_S = LIMITS.add("time to speed up, beside Q_TRANSITION_MS", 15.0, "s", "a choice: three times the usual")
-_WEAK = LIMITS.add("probability of a part", 0.35, "", "a choice: limits of throttle and airspeed slow it as well")
+_WEAK_P = LIMITS.add("probability of a part", 0.35, "", "a choice: limits of throttle and airspeed slow it as well")
 _FADES_MS = 5000.0
 """Q_TRANSITION_MS as shipped (ArduPlane/quadplane.cpp)."""
 _BEGINS, _DONE = re.compile(r"Transition started"), re.compile(r"Transition (?:FW )?done")
@@ -52,7 +52,7 @@ def find(flight: Flight) -> Iterator[Finding]:
                     f"{_SPEEDS_UP_S:g} s to speed up)" + ("; the vehicle says that it failed" if gave_up else "")
                 ),
                 source="MSG: Transition started, done",
-                probability=_WEAK,
+                probability=_WEAK_P,
             )
             return
 

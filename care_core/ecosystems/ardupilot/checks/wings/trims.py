@@ -29,8 +29,8 @@ _AS_DEFAULT = LIMITS.add("share of it within which the default is meant", 0.5, "
 _FAR = LIMITS.add("the same that loses a mission, as a share of the travel", 0.4, "", "a choice: a turn wants the rest")
 _BANK_DEG = LIMITS.add("bank of straight flight", 5.0, "deg", "twice what any simulated plane with a right trim has")
 _FAR_DEG = LIMITS.add("bank that loses a mission", 20.0, "deg", "2 of 2 simulated planes; one of 15.5 flew its mission")
-_SURE = LIMITS.add("probability of the trim", 0.9, "", "it is measured")
-_LOST = LIMITS.add("probability that a smaller one loses the mission", 0.3, "", "a choice: its way is off in turns")
+_SURE_P = LIMITS.add("probability of the trim", 0.9, "", "it is measured")
+_LOST_P = LIMITS.add("probability that a smaller one loses the mission", 0.3, "", "a choice: its way is off in turns")
 
 _MIDDLE_US = 1500.0
 """The trim of an output as shipped."""
@@ -135,8 +135,8 @@ def _finding(surface: _Surface, title: str, evidence: str, is_far: bool, wanted:
         evidence=evidence,
         source=f"{measured}ATT.Yaw, RCOU.{surface.output}",
         suspect="parameter",
-        probability=_SURE,
-        mission_lost=None if is_far else _LOST,
+        probability=_SURE_P,
+        mission_lost=None if is_far else _LOST_P,
         parameters=(surface.parameter,),
         wanted=((surface.parameter, wanted),),
     )
