@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 from care_core.diagnose.estimates import DOUBT
+from care_core.diagnose.records import MISSION_FAILED
 from care_core.diagnose.verdict import exit_code, status_of
 from care_core.errors import ExitCode
 from care_core.report.document import CauseEntry, Report
@@ -117,7 +118,7 @@ def _(report: Report) -> bool:
 
 @_named("a FAULT that does not say what failed")
 def _(report: Report) -> bool:
-    return report.verdict.status == "fault" and report.verdict.failed.endswith("not met")
+    return report.verdict.status == "fault" and report.verdict.failed.endswith(("not met", MISSION_FAILED))
 
 
 @_named("the status is not that of its objectives and findings")

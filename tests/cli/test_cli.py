@@ -167,7 +167,7 @@ def test_the_newest_log_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_triage_prints_data_on_stdout_alone(care: Care, made: dict[str, Any]) -> None:
     outcome = care("triage", "a.BIN")
     assert outcome.code == 1
-    assert outcome.stdout.startswith("FAULT: mission_time")
+    assert outcome.stdout.startswith("FAULT: too slow: ")
     assert outcome.stderr == ""
     assert json.loads(care("triage", "a.BIN", "--json").stdout)["schema"] == "care.triage/1"
     assert "diff: |" in care("triage", "a.BIN", "--yaml").stdout
@@ -211,7 +211,7 @@ def test_a_report_is_written_in_the_format_of_its_name(care: Care, made: dict[st
     outcome = care("triage", "a.BIN", "--out", out)
     assert (outcome.code, outcome.stdout, outcome.stderr) == (1, "", f"wrote {out}\n")
     *verdict, schema = out.read_text().partition("\nfit:")[0].splitlines()
-    assert verdict[0].startswith("# FAULT: mission_time 190 s")
+    assert verdict[0].startswith("# FAULT: too slow: 190 s")
     assert verdict[-1].startswith("# Profile ")
     assert schema == "schema: care.triage/1"
     assert care("triage", "a.BIN", "--out", tmp_path / "none" / "report.json").code == 2

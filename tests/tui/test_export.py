@@ -157,6 +157,7 @@ async def test_what_was_decided_since_a_file_was_written_is_not_what_it_holds(ma
 def test_the_text_of_a_page_is_shown_without_the_escapes_of_markdown() -> None:
     case = Case(made_diagnosis())
     shown = preview_of(case, FORMATS["html"])
-    assert "mission_time 190 s, wanted <= 150 s" in shown
-    assert "mission\\_time" in case.report("markdown")
+    assert "too slow: 190 s, limit 150 s" in shown
+    assert "\\x1b\\[31m" in case.report("markdown")
+    assert "\\x1b[31m" in shown
     assert preview_of(case, FORMATS["markdown"]) == case.report("markdown")

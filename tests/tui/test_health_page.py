@@ -27,7 +27,7 @@ async def test_the_first_step_tells_what_happened_the_first_cause_first(make_app
         await settle(pilot)
         assert step_of(app) == 1, "with a critical finding the app opens on it"
         assert title(app) == "What happened: ArduCopter V4.3.6, quad X"
-        assert pinned(app)[0].startswith("✗ FAULT  mission_time 187.2 s, wanted <= 150 s")
+        assert pinned(app)[0].startswith("✗ FAULT  too slow: 187.2 s, limit 150 s")
         lines = [line.split() for line in items(app).splitlines()]
         assert [line[:4] for line in lines[:4]] == [
             ["✗", "CRITICAL", "91.3", "s"],
@@ -144,7 +144,7 @@ async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_v
         for key in "123456yb":
             await settle(pilot, key)
             fault, cause, change, limits = pinned(app)
-            assert fault.startswith("✗ FAULT  mission_time 187.2 s")
+            assert fault.startswith("✗ FAULT  too slow: 187.2 s")
             assert cause.startswith("Cause    █████████░  90 %  motor 2 lost thrust")
             assert "91 %  LAND_SPEED 16 → 50 cm/s" in change
             assert limits.startswith("! Profile arducopter partly fits: the firmware is 4.3.6, ")

@@ -81,7 +81,7 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         assert "▸ arducopter" in items(app)
         assert "Model card: arducopter" in text(app)
         await settle(pilot, "escape", "y")
-        assert "FAULT: mission_time" in items(app)
+        assert "FAULT: too slow: " in items(app)
         assert "LAND_SPEED" in text(app)
         await settle(pilot, "x", "x", "escape")
         assert isinstance(app.screen, CaseScreen)
@@ -230,7 +230,7 @@ async def test_a_folder_lists_its_logs_with_verdicts_and_enter_opens_one(tmp_pat
         assert walk(app).here == "logs"
         assert title(app).startswith("2 logs in "), "none that was opened elsewhere"
         told = {line.split()[-1] if "UNREADABLE" in line else "flight": line for line in items(app).splitlines()}
-        assert any("FAULT" in line and "mission_time" in line for line in told.values())
+        assert any("FAULT" in line and "too slow" in line for line in told.values())
         assert any("UNREADABLE" in line for line in told.values())
         await settle(pilot, "slash", *"flight", "enter", "enter")
         await settle(pilot)

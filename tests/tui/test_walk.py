@@ -130,7 +130,7 @@ async def test_the_objectives_tell_all_three_states_and_where_the_run_came_from(
         await settle(pilot, "z")
         for fact in ("00000042.BIN", "1 of 2", "arducopter 1.0", "31 of 31", "4.3.6", "byte 1048576", "Land: slow"):
             assert fact in text(app)
-        assert "FAULT  mission_time 187.2 s, wanted <= 150 s; energy 11.3 Wh" in answer(app)
+        assert "FAULT  too slow: 187.2 s, limit 150 s; too much energy: 11.3 Wh" in answer(app)
         assert title(app) == "Objectives: 2 outside, 1 within, 1 not evaluated"
         for line in ("✓ OK", "✗ FAULT          mission_time", "? NOT EVALUATED  path_error"):
             assert line in items(app)

@@ -58,7 +58,7 @@ def test_an_objective_is_a_case_and_a_broken_limit_fails_with_cause_and_suggesti
     assert len(cases["success"]) == 0
     failure = cases["mission_time"].find("failure")
     assert failure is not None
-    assert failure.get("message") == "mission_time 190 s, wanted <= 150 s"
+    assert failure.get("message") == "too slow: 190 s, limit 150 s"
     told = failure.text or ""
     assert "land_speed -> land_time -> mission_time" in told
     assert "Change land_speed 16 -> 50 (70% the cause): 90% probability that all objectives are met" in told

@@ -118,10 +118,10 @@ def test_no_text_of_a_log_can_steer_a_terminal_or_a_table() -> None:
 
 def test_markdown_can_be_pasted_into_a_ticket() -> None:
     text = to_markdown(build_document(made_diagnosis()))
-    assert text.startswith("# Triage of a.BIN\n\n**FAULT**: mission\\_time 190 s, wanted")
+    assert text.startswith("# Triage of a.BIN\n\n**FAULT**: too slow: 190 s, limit 150 s")
     assert "\n\nProfile arducopter partly fits: firmware" in text
     answer = text.replace("\\", "")
-    assert "\n\n**FAULT**: mission_time 190 s, wanted <= 150 s; motor 2" in answer
+    assert "\n\n**FAULT**: too slow: 190 s, limit 150 s; motor 2" in answer
     assert "\n\nChange land_speed 16 -> 50 (70% the cause): 90% probability that all objectives are met" in answer
     assert "land_speed → land_time → mission_time" in text
     assert "```diff\n--- as driven" in text
@@ -130,7 +130,7 @@ def test_markdown_can_be_pasted_into_a_ticket() -> None:
 def test_the_terminal_text_answers_first_and_fits_80_columns() -> None:
     text = to_text(made_diagnosis())
     lines = text.splitlines()
-    assert lines[0].startswith("FAULT: mission_time 190 s, wanted <= 150 s; motor 2")
+    assert lines[0].startswith("FAULT: too slow: 190 s, limit 150 s; motor 2")
     assert "land_speed 16 -> 50" in lines[2]
     assert any(line.startswith("Profile arducopter partly fits: firmware Arm:") for line in lines[3:9])
     assert max(map(len, lines)) <= 80
