@@ -7,7 +7,7 @@ import pytest
 
 from care_core.ecosystems.findings import Finding, every_finding
 from tests.flights import DOWN_S
-from tests.planes import MadePlane
+from tests.planes import HEIGHT_M, MadePlane
 
 RATES_HZ = (10.0, 2.5)
 
@@ -298,3 +298,17 @@ def test_a_surface_whose_trim_is_off_is_not_reversed(offset: float) -> None:
     flown.table["ATT"]["Roll"][now] -= 20.0 * (flown.t[now] - 50.0)
     titles = [one.title for one in every_finding(flown.find())]
     assert ("the ailerons no longer obey" in titles) == (offset == 0.0)
+
+
+@pytest.mark.parametrize(("blow", "keeps", "is_told"), [(400.0, 0.5, True), (60.0, 0.5, False), (400.0, 0.95, False)])
+def test_a_plane_that_hits_the_ground_and_flies_on_is_told(blow: float, keeps: float, is_told: bool) -> None:
+    made = MadePlane()
+    dive = np.interp(made.t, [50.0, 54.0, 54.5, 60.0], [0.0, HEIGHT_M - 1.0, HEIGHT_M - 1.0, 0.0])
+    for name, field in (("POS", "RelHomeAlt"), ("BARO", "Alt"), ("BARO#2", "Alt"), ("GPS", "Alt")):
+        made.table[name][field] -= dive
+    made.table["GPS"]["Spd"][made.after(54.3, 58.0)] *= keeps
+    for table in ("IMU", "IMU#2"):
+        made.table[table]["AccZ"] += made.noise(2.0)  # its motor shakes it on
+        made.table[table]["AccZ"][made.after(54.2, 54.25)] = -blow
+    titles = [one.title for one in every_finding(made.find())]
+    assert ("it hit the ground at 18 m/s and flew on" in titles) is is_told

@@ -76,6 +76,8 @@ _REST_S, _REST_M, _ROLLS_MS, _LOW_M = 4.0, 2.0, 3.0, 5.0
 """What hit the ground rests for so long, within so much height, no faster and no higher than this."""
 _HIT_LOST_S = 10.0
 """What left its demand so shortly before it hit the ground, and was not back since, had lost control."""
+_GRAZES, _GRAZED = 100.0, 0.7
+"""m/s^2: a belly landing is as hard at most; and the share of its speed that what touches nothing keeps."""
 _FAST_MS, _STILL = 5.0, 2.0
 """A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
 _SIMULATED_HIT = re.compile(r"(?:SIM )?Hit ground at (\d+(?:\.\d+)?) m/s")
@@ -389,6 +391,24 @@ class Airborne(Armed):
                 said = f"a blow of {blow:.0f} m/s^2 stopped it dead from {flew:.1f} m/s"
                 yield Hit(at, flew, said, "something" if is_high else "the ground")
                 return
+
+    @cached_property
+    def grazed(self) -> Hit | None:
+        """A blow at the ground that took much of a plane's speed, though it came from above and flew on; None where
+        there was none."""
+        table, height, moved = self.one("IMU", "AccX", "AccY", "AccZ"), self.height, self.one("GPS", "Spd")
+        if table is None or height is None or moved is None or not self.is_winged:
+            return None
+        t, felt = table.t, np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
+        for at, _ in runs(t, (felt > _GRAZES) & during(self.airborne, t), gap_s=_STRUCK_S):
+            before, after = self._flew_ms(at), moved["Spd"][(moved.t > at) & (moved.t < at + _STRUCK_S)]
+            from_above = float(np.max(height[1][(height[0] > at - _HIT_LOST_S) & (height[0] < at)], initial=0.0))
+            flies_on = float(np.max(height[1][height[0] > at + _STRUCK_S], initial=0.0))
+            is_low = float(np.interp(at, *height)) < _LOW_M < 2 * _LOW_M < min(from_above, flies_on)
+            if is_low and before > _TAXIES_MS and float(np.min(after, initial=before)) < _GRAZED * before:
+                blow = float(np.max(felt[(t >= at) & (t <= at + _STRUCK_S)]))
+                return Hit(at, before, f"a blow of {blow:.0f} m/s^2 took much of its {before:.0f} m/s, and it flew on")
+        return None
 
     def _fell_ms(self, at: float) -> float:
         """How fast it came down in the second before, or in the last half of it."""

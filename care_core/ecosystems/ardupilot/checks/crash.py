@@ -43,6 +43,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     begin = min((t for t in (told, said, lost, impact) if t is not None), default=None)
     if begin is None:
         yield from _stranded(flight)
+        yield from _grazed(flight)
     elif _tipped(flight, lost if lost is not None else begin):
         if wrong_layout(flight) is not None:
             return  # that says why
@@ -114,6 +115,20 @@ def _stranded(flight: Flight) -> Iterator[Finding]:
             ),
             source="CTUN",
             probability=_STRANDED_P,
+        )
+
+
+def _grazed(flight: Flight) -> Iterator[Finding]:
+    if (hit := flight.grazed) is not None:
+        yield Finding(
+            kind="crash",
+            title=f"it hit the ground at {hit.speed_ms:.0f} m/s and flew on",
+            onset_s=hit.time_s,
+            end_s=hit.time_s,
+            severity="critical",
+            evidence=hit.said,
+            source="IMU, GPS.Spd, height",
+            probability=_CRASHED,
         )
 
 
