@@ -21,7 +21,7 @@ from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.ecosystems.spans import runs
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
-from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made, flight_of
+from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, HOVER, UP_S, Made, flight_of
 from tests.whole import examples
 
 JUMP = Damage("the clock jumps", 0, 40.0, is_jump=True)
@@ -850,6 +850,32 @@ def test_a_copter_that_turned_over_and_lay_on_its_back(
     crashes = [one for one in every_finding(made.find()) if one.kind == "crash"]
     assert [(one.title, one.suspect) for one in crashes] == [("it turned over", suspect)] * turned
     assert made.flight().impact_s == (pytest.approx(UP_S + 2, abs=0.2) if turned else None)
+
+
+def test_what_turned_over_and_was_disarmed_at_once_lies_on() -> None:
+    made = Made()
+    made.rows["ARM"] = [(ARMED_S, {"ArmState": 1.0, "Forced": 0.0}), (UP_S + 3, {"ArmState": 0.0, "Forced": 0.0})]
+    over = made.after(UP_S + 1.2)
+    for name in ("POS", "CTUN"):
+        made.table[name].update(
+            {field: 0.1 + made.noise(0.01) for field in ("RelHomeAlt", "Alt") if field in made.table[name]}
+        )
+    made.table["CTUN"]["ThO"][:] = np.where(made.after(UP_S, UP_S + 1), 0.19, 0.0)
+    made.table["ATT"]["Roll"][over] = 168.0
+    made.table["IMU"]["AccZ"][over] = 9.8
+    assert made.flight().turned_over_s == pytest.approx(UP_S + 1.2, abs=0.2)
+    assert first(made).title == "it tipped over at take-off"
+
+
+def test_what_tips_as_it_touches_down_with_its_throttle_cut_hit_nothing() -> None:
+    made = Made()
+    tips = made.after(DOWN_S + 0.3)
+    made.rows["ERR"] = [(DOWN_S + 2.5, {"Subsys": 12.0, "ECode": 1.0})]
+    made.table["CTUN"]["ThO"][made.t > DOWN_S - 0.1] = 0.0
+    made.table["CTUN"]["ThO"][made.after(DOWN_S - 3.0, DOWN_S - 0.2)] = HOVER
+    made.table["ATT"]["Pitch"][tips] = 70.0
+    made.table["IMU"]["AccZ"][made.after(DOWN_S, DOWN_S + 0.15)] = -45.0
+    assert "it turned over at landing" in [one.title for one in every_finding(made.find())]
 
 
 def test_a_descent_into_the_ground_by_the_stick_is_no_failure() -> None:

@@ -274,16 +274,16 @@ class Airborne(Armed):
     @cached_property
     def turned_over_s(self) -> float | None:
         """When an upright copter with working motors turned over and then lay on its back, at rest, until it was
-        disarmed; in acro as well, since what is upside down in the air falls and feels less than gravity."""
+        disarmed and on; in acro as well, since what is upside down in the air falls and feels less than gravity."""
         table, leans, driven = self.one("IMU", "AccX", "AccY", "AccZ"), self.tilt, self.throttle
         if table is None or leans is None or driven is None or not self.is_copter:
             return None
         t, tilt = leans
         felt = np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
         for armed_s, disarmed_s in self.armed:
-            armed = (t >= armed_s) & (t <= disarmed_s)
-            for start, end in runs(t, (tilt > UPSIDE_DOWN_DEG) & armed, gap_s=_STRUCK_S):
-                if end - start < _LIES_S or end < disarmed_s - _STRUCK_S:
+            seen = (t >= armed_s) & (t <= disarmed_s + _LIES_S)
+            for start, end in runs(t, (tilt > UPSIDE_DOWN_DEG) & seen, gap_s=_STRUCK_S):
+                if end - start < _LIES_S or end < disarmed_s - _STRUCK_S or start > disarmed_s:
                     continue
                 since = max(start - _BEFORE_OVER_S, armed_s)
                 before = tilt[(t >= since) & (t < start)]

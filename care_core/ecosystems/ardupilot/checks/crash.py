@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.airborne import ACRO
+from care_core.ecosystems.ardupilot.airborne import ACRO, OFF_GROUND_M
 from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
@@ -21,6 +21,7 @@ LIMITS = Limits()
 _LOW_M = LIMITS.add("height of a tip-over", 1.5, "m", "a choice: lower than a person's chest")
 _TAKEOFF_S = LIMITS.add("tip-over after the first throttle", 15.0, "s", "a choice: a take-off takes no longer")
 _FIRST_THROTTLE = LIMITS.add("first throttle", 0.15, "", "a choice: MOT_SPIN_MIN as shipped")
+_IDLES = LIMITS.add("throttle that is cut", 0.05, "", "a choice: motors idle below it")
 _STICK_LOW = LIMITS.add("throttle stick at its bottom", 1150.0, "us", "a choice: sticks end between 1000 and 1100")
 _STICK_LEAST = LIMITS.add("pulse of a stick", 800.0, "us", "receivers send 800 to 2200; less is no signal")
 _ANSWERS_S = LIMITS.add("time in which a mode acts on the throttle", 0.5, "s", "a choice: motors answer sooner")
@@ -67,7 +68,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         is_said = told is not None or said is not None
         over = lost is None and not is_said and first == flight.turned_over_s
         undriven = not over and _undriven(flight, first)
-        steered = "" if undriven else _steered(flight, first)
+        landing = not over and not undriven and _at_landing(flight, first)
+        steered = "" if undriven or landing else _steered(flight, first)
         by_sticks = over and int(flight.modes_at(np.array([first]))[0]) in ACRO
         shown = (
             "the firmware says: crash" if is_said else "control was lost, and it came down" if lost is not None else "",
@@ -76,29 +78,42 @@ def find(flight: Flight) -> Iterator[Finding]:
             "it went over with its motors turning, and lay on its back until it was disarmed" if over else "",
             "the sticks tell how fast it turns in this mode" if by_sticks else "",
             "no throttle was given since it was armed: does it estimate its attitude rightly?" if undriven else "",
-            "a blow came before control was lost" if flight.blow_s is not None else "",
+            "its throttle was down as it touched the ground" if landing else "",
+            "a blow came before control was lost" if flight.blow_s is not None and not landing else "",
             "it turned over and did not fall: it lies on what it hit" if flight.is_caught else "",
         )
         yield Finding(
             kind="crash",
-            title=UNDRIVEN if undriven else "it turned over" if over else _what(flight, steered),
+            title=UNDRIVEN if undriven else "it turned over" if over else _what(flight, steered, landing=landing),
             onset_s=first,
             end_s=first,
             severity="critical",
             evidence="; ".join(filter(None, shown)),
             source="ERR 12, MSG, ATT, IMU, height",
-            suspect="operation" if steered or by_sticks else "hardware",
-            probability=_STEERED_P if steered else _BY_STICKS_P if by_sticks else _CRASHED_P,
+            suspect="operation" if steered or by_sticks or landing else "hardware",
+            probability=_STEERED_P if steered else _BY_STICKS_P if by_sticks or landing else _CRASHED_P,
         )
 
 
-def _what(flight: Flight, steered: str) -> str:
+def _what(flight: Flight, steered: str, *, landing: bool) -> str:
+    if landing:
+        return "it turned over at landing"
     if steered:
         return STEERED
     if flight.struck_s is not None:
         return "it hit something"
     hit = flight.ending_hit
     return "it crashed" if hit is None else f"it hit {hit.what} at {hit.speed_ms:.1f} m/s"
+
+
+def _at_landing(flight: Flight, at: float) -> bool:
+    """Whether a copter that had flown was down with its throttle cut as it struck what turned it over: the ground."""
+    driven, known, lost = flight.throttle, flight.height, flight.lost_control_s
+    if driven is None or known is None or lost is None or not flight.is_copter or not flight.airborne:
+        return False
+    if not flight.airborne[0][0] < at or flight.ending_hit is not None:
+        return False
+    return float(np.interp(at, *known)) < OFF_GROUND_M and float(np.interp(at, *driven)) < _IDLES
 
 
 def _stranded(flight: Flight) -> Iterator[Finding]:
@@ -128,7 +143,7 @@ def _grazed(flight: Flight) -> Iterator[Finding]:
             severity="critical",
             evidence=hit.said,
             source="IMU, GPS.Spd, height",
-            probability=_CRASHED,
+            probability=_CRASHED_P,
         )
 
 
