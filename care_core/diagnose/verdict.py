@@ -297,7 +297,7 @@ def compose(
     return Verdict(
         fit=clean(fit_line(profile, fit, LINES)),
         status=status,
-        failed=clean(_failed(status, fit.verdict, objectives, findings)),
+        failed=clean(_failed(status, fit.verdict, objectives, findings, " in this run" if others else "")),
         advice=advice,
         reasons=reasons,
         next_step=clean(next_step),
@@ -340,8 +340,13 @@ def exit_code(*statuses: RunStatus) -> ExitCode:
 
 
 def _failed(
-    status: Status, fit: FitVerdict, objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding]
+    status: Status,
+    fit: FitVerdict,
+    objectives: Sequence[JudgedObjective],
+    findings: Sequence[SeenFinding],
+    where: str,
 ) -> str:
+    """`where`: of which run nothing was found, where another of the log failed."""
     if status == "fault":
         return _fault(objectives, findings)
     unknown = [one for one in objectives if one.status == "not_evaluated"]
@@ -354,7 +359,7 @@ def _failed(
             return reason
         names = ", ".join(one.name for one in unknown)
         # The reason first: of a long list of names a narrow line shows the beginning alone.
-        return f"{reason}{'; ' if reason else ''}{names} could not be evaluated, no fault was found"
+        return f"{reason}{'; ' if reason else ''}{names} could not be evaluated, no fault was found{where}"
     if status == "not_evaluated" and fit == "no":
         met = listed([one.name for one in objectives if one.status == "ok"])
         return f"{met} are OK; no profile fits, so nothing else was judged"

@@ -26,7 +26,7 @@ from care_core.diagnose.verdict import (
     hypothesis_text,
     verdict_of,
 )
-from care_core.ecosystems.findings import STEERED, Finding
+from care_core.ecosystems.findings import STEERED, Finding, Health
 from care_core.errors import ExitCode, UsageError
 from care_core.files import bundled
 from care_core.records import replace
@@ -244,6 +244,9 @@ def test_a_good_mission_that_was_flown_last_hides_none_that_failed() -> None:
     assert verdict_of(replace(good, missions=(fine, replace(failed, mission=good.run.mission)))).others == ""
     document = build_document(replace(good, missions=(fine, failed)))
     assert remembered_verdict(document).others == verdict.others
+    unknown = ObjectiveResult(SUCCESS, None, SUCCESS.threshold, "not_evaluated", "no BAT in the log")
+    beside = verdict_of(replace(good, objectives=(unknown, MET), missions=(fine, failed), health=Health("", (), ())))
+    assert beside.headline.endswith("no fault was found in this run")
 
 
 def test_what_is_less_likely_is_named_where_nothing_has_a_name() -> None:
