@@ -19,7 +19,7 @@ from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.ecosystems.spans import Span, during, runs, seconds_in
 from care_core.ecosystems.vehicles.errors import BATTERY_FAILSAFE
 from care_core.logs.base import Wanted
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 from care_core.records import replace
 from care_core.text import log_time
 
@@ -67,11 +67,11 @@ def find(flight: Flight) -> Iterator[Finding]:
     high = [span for span in spans if not climbs(flight, *span)]
     full = [span for span in saturated(flight) if _below(flight, *span) or not climbs(flight, *span)]
     sinking = _sinking(flight)
-    if strained := full or sinking:
+    if strained := sinking or full:
         start = strained[0][0]
-        begin = min([start, *[a for a, _ in high]])
+        begin = start if sinking else min([start, *[a for a, _ in high]])
         before = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
-        found = _too_little(flight, strained, begin, before, FULL if full else _NEARLY_FULL, sinking)
+        found = _too_little(flight, strained, begin, before, _NEARLY_FULL if sinking else FULL, sinking)
         yield replace(found, probability=max(found.probability, _LACKS_P)) if sinking else found
     elif high and seconds_in(high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
         share = 100 * float(median(level[flown]))
@@ -130,18 +130,25 @@ def saturated(flight: Flight) -> list[Span]:
 
 
 def _sinking(flight: Flight) -> list[Span]:
-    """When it sinks on with nearly all that its motors have: a descent that began before would end at that."""
-    driven, known = flight.throttle, flight.height
+    """When it sinks on with nearly all that its motors have: a descent that began before would end at that. An estimate
+    that runs away sinks alone: the barometer has to tell the same."""
+    driven, known, barometer = flight.throttle, flight.height, flight.one("BARO", "Alt")
     if driven is None or known is None:
         return []
+    heights = [known, *([] if barometer is None else [(barometer.t, barometer["Alt"])])]
     t, throttle = driven
     spans = []
     for start, end in runs(t, (throttle > _NEARLY_FULL) & during(flight.watched, t)):
         at = t[(t >= start + _FULL_LASTS_S) & (t <= end)]
-        sank = np.interp(at - _FULL_LASTS_S, *known) - np.interp(at, *known) > _BELOW_M
-        sinks = np.interp(at - 1.0, *known) - np.interp(at, *known) > _SINKS_MS
+        sank = np.all([_fell(height, at, _FULL_LASTS_S) > _BELOW_M for height in heights], axis=0)
+        sinks = np.all([_fell(height, at, 1.0) > _SINKS_MS for height in heights], axis=0)
         spans += [(a - _FULL_LASTS_S, b) for a, b in runs(at, sank & sinks, gap_s=_FULL_LASTS_S)]
     return spans
+
+
+def _fell(height: tuple[Floats, Floats], at: Floats, for_s: float) -> Floats:
+    """How far a height fell in the time before."""
+    return np.interp(at - for_s, *height) - np.interp(at, *height)
 
 
 def _sank_m(flight: Flight, start: float, end: float) -> float:
