@@ -63,7 +63,7 @@ def test_a_failsafe_of_a_monitor_that_gains_in_the_air_is_of_no_battery() -> Non
     made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
     made.table["BAT"]["Volt"] = np.interp(made.t, [0.0, END_S], [5.95, 6.1])
     finding = made.find()[0]
-    assert (finding.title, finding.parameters) == (NO_BATTERY, ())
+    assert (finding.title, finding.parameters) == (f"{NO_BATTERY}, and its failsafe acted", ())
     assert "no pack gains by flying" in finding.evidence
 
 
@@ -164,6 +164,7 @@ def test_a_rover_that_never_drove_loses_no_fix_on_its_way(throttle: float, is_to
     made.rows["MODE"] = [(0.0, {"ModeNum": 0.0})]
     made.table["CTUN"]["ThO"][:] = throttle
     made.table["GPS"]["Status"][made.after(40.0, 60.0)] = 2.0
+    made.table["GPS"]["Spd"][:] = 0.3
     assert ("the GPS fix was lost on the way" in titles(made)) == is_told
 
 

@@ -283,7 +283,8 @@ class Airborne(Armed):
         for armed_s, disarmed_s in self.armed:
             seen = (t >= armed_s) & (t <= disarmed_s + _LIES_S)
             for start, end in runs(t, (tilt > UPSIDE_DOWN_DEG) & seen, gap_s=_STRUCK_S):
-                if end - start < _LIES_S or end < disarmed_s - _STRUCK_S or start > disarmed_s:
+                in_the_air = self.hit is not None and start < self.hit.time_s <= end
+                if end - start < _LIES_S or end < disarmed_s - _STRUCK_S or start > disarmed_s or in_the_air:
                     continue
                 since = max(start - _BEFORE_OVER_S, armed_s)
                 before = tilt[(t >= since) & (t < start)]

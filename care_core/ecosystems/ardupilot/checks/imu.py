@@ -154,9 +154,8 @@ def _offset(flight: Flight) -> Iterator[Finding]:
     """A gyro that tells of turning while the vehicle lies still: the attitude is carried away with it. Of a run in
     which it never rests, the others of its log tell."""
     rests = list(gravity.rests(flight)) or list(gravity.rests(flight.whole) if flight.armed else ())
-    turning = [rest for rest in rests if rest.turns_dps > gravity.TURNS_DPS]
-    if turning:
-        most = float(median(np.array([rest.turns_dps for rest in turning])))
+    if rests and min(rest.turns_dps for rest in rests) > gravity.TURNS_DPS:  # one that is offset is so each time
+        most = float(median(np.array([rest.turns_dps for rest in rests])))
         yield Finding(
             kind="imu",
             title="the gyro is offset at rest",

@@ -36,6 +36,7 @@ _NEARLY_FULL = LIMITS.add(
 _SINKS_MS = LIMITS.add(
     "sink that goes on with it", 1.0, "m/s", "a choice: what has thrust to spare has stopped by then"
 )
+_LEVEL_DEG = LIMITS.add("lean of what should not sink with it", 25.0, "deg", "its lift is 9 % less")
 _FULL_LASTS_S = LIMITS.add("shortest time at full throttle", 3.0, "s", "a choice: a gust is over sooner")
 _BELOW_M = LIMITS.add("height below the one wanted", 2.0, "m", "a choice: height control is within a metre")
 _CLIMBS_MS = LIMITS.add("climb of what has thrust to spare", 1.0, "m/s", "a choice: half of PILOT_SPEED_UP as shipped")
@@ -130,18 +131,20 @@ def saturated(flight: Flight) -> list[Span]:
 
 
 def _sinking(flight: Flight) -> list[Span]:
-    """When it sinks on with nearly all that its motors have: a descent that began before would end at that. An estimate
-    that runs away sinks alone: the barometer has to tell the same."""
-    driven, known, barometer = flight.throttle, flight.height, flight.one("BARO", "Alt")
-    if driven is None or known is None:
+    """When it sinks no slower with nearly all that its motors have, level, by estimate and barometer alike: a descent
+    that began before gets slower at that, and what leans far spends its thrust elsewhere."""
+    driven, known, leans = flight.throttle, flight.height, flight.tilt
+    if driven is None or known is None or leans is None:
         return []
-    heights = [known, *([] if barometer is None else [(barometer.t, barometer["Alt"])])]
     t, throttle = driven
+    level = np.interp(t, leans[0], smooth(*leans, 1.0)) < _LEVEL_DEG
     spans = []
-    for start, end in runs(t, (throttle > _NEARLY_FULL) & during(flight.watched, t)):
+    for start, end in runs(t, (throttle > _NEARLY_FULL) & level & during(flight.watched, t)):
         at = t[(t >= start + _FULL_LASTS_S) & (t <= end)]
+        heights = [one for one in (known, flight.barometer) if one is not None]
         sank = np.all([_fell(height, at, _FULL_LASTS_S) > _BELOW_M for height in heights], axis=0)
-        sinks = np.all([_fell(height, at, 1.0) > _SINKS_MS for height in heights], axis=0)
+        first_m, last_m = _fell(known, at - _FULL_LASTS_S + 1.0, 1.0), _fell(known, at, 1.0)
+        sinks = (last_m > _SINKS_MS) & (last_m >= first_m)
         spans += [(a - _FULL_LASTS_S, b) for a, b in runs(at, sank & sinks, gap_s=_FULL_LASTS_S)]
     return spans
 
