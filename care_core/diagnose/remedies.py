@@ -74,6 +74,14 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         "the estimator rejects its measurements",
         "find which measurement it rejects: look at GPS, compass, barometer and vibration at that time",
     ),
+    (
+        r"the estimated (height|climb rate) runs away",
+        "see what barometer and accelerometers read while it stands, and calibrate these: one of the two is off",
+    ),
+    (
+        r"it (tipped|turned) over at (take-off|landing)",
+        "see that it stands level and free, and check the motors' order and directions, propellers and landing gear",
+    ),
     ("barometer and range finder", "lift it to a height that you measure, and see which of the two is wrong"),
     (r"(.*) (?:is|are) at the stop", r"check \1: servo, linkage and horn, free travel, and the load in flight"),
     (
@@ -128,6 +136,7 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
     ("the robot (hits|touches|stays against)", _HIT),
     (r"the robot (tips|falls)", "look at the ground where it went over, at its load and at how fast it turned"),
     ("the computer is too busy", f"{_TAKES_TIME}, and lower its rate"),
+    (r"(\S+): .*\b[Mm]ission (has )?failed", r"look at what \1 said before that"),
     (r"diagnostics: (.*)", r"look at what its driver reports: \1"),
 )
 """Patterns of titles, from their first character on, with what to do; the first that fits counts."""

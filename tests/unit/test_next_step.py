@@ -88,6 +88,10 @@ def test_a_part_that_failed_is_what_to_look_at_whatever_explains_more() -> None:
         ("drive", "the drive does not answer its commands", "check the emergency stop, the motor driver's fault light"),
         ("localisation", "odometry drifts: its position and its speed disagree", "check wheel radius"),
         ("software", "bt_navigator: it ended", "look at what this names: bt_navigator: it ended"),
+        ("software", "left_mission: [ERROR] Mission failed!", "look at what left_mission said before that"),
+        ("estimator", "the estimated climb rate runs away from the barometer's", "see what barometer and accelerometers"),
+        ("crash", "it turned over at landing", "see that it stands level and free"),
+        ("software", "Position was asked for, and no position is known", "give it a source of position"),
     ],
 )
 def test_each_kind_of_finding_has_an_advice_of_its_own(kind: FindingKind, title: str, told: str) -> None:
