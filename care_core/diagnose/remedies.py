@@ -79,7 +79,7 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         "see what barometer and accelerometers read while it stands, and calibrate these: one of the two is off",
     ),
     (
-        r"it (tipped|turned) over at (take-off|landing)",
+        "it tipped over at take-off",
         "see that it stands level and free, and check the motors' order and directions, propellers and landing gear",
     ),
     ("barometer and range finder", "lift it to a height that you measure, and see which of the two is wrong"),
