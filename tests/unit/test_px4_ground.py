@@ -57,6 +57,28 @@ def test_a_bench_run_that_somebody_broke_off_did_not_fail() -> None:
     assert not never_flew([one])
 
 
+@pytest.mark.parametrize(("amps", "lean_deg", "is_told"), [(0.2, 30.0, True), (0.2, 3.0, False), (12.0, 30.0, False)])
+def test_what_is_carried_about_while_it_is_to_lift_has_no_power(amps: float, lean_deg: float, is_told: bool) -> None:
+    half = np.radians(lean_deg) / 2
+    titles = [
+        one.title
+        for one in found(
+            vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 3)], failsafe=[(0, 0)]),
+            vehicle_local_position=states(z=[(0, 0.0)], vz=[(0, 0.0), (20, -1.5)]),
+            vehicle_local_position_setpoint=states(vz=[(0, 0.0), (20, -1.5)]),
+            vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, 0.0), (20, -0.8)]}),
+            battery_status=states(voltage_v=[(0, 12.0)], current_a=[(0, 0.05), (20, amps)]),
+            vehicle_attitude=states(**quaternion(float(np.cos(half)), float(np.sin(half)))),
+            vehicle_attitude_setpoint=states(**quaternion(1.0, 0.0, "q_d")),
+        )
+    ]
+    assert (UNPOWERED in titles) == is_told
+
+
+def quaternion(w: float, x: float, name: str = "q") -> dict[str, list[tuple[float, float]]]:
+    return {f"{name}[{n}]": [(0.0, value)] for n, value in enumerate((w, x, 0.0, 0.0))}
+
+
 def test_a_current_that_is_not_measured_tells_of_no_power() -> None:
     assert [one.title for one in on_ground(0.05) if one.kind == "thrust"] == ["too little thrust"]
 

@@ -9,7 +9,7 @@ MPC_THR_MIN and MPC_THR_MAX. What is at that end and still far off cannot be hel
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from care_core.logs.base import Wanted
 from care_core.numbers import Floats, median
 from care_core.records import replace
 from care_core.run import shown
+from care_core.text import log_time
 
 _BATTERY = "battery_status"
 _WANTED, _AIR = "vehicle_local_position_setpoint", "vehicle_air_data"
@@ -47,6 +48,7 @@ _LEAST = LIMITS.add("least thrust", 0.12, "", "MPC_THR_MIN as shipped")
 _NEAR_LEAST = LIMITS.add("thrust near the least", 0.02, "", "a choice: it is rounded")
 _LIFTS = LIMITS.add("thrust that lifts", 0.4, "", "a choice: what hovers with less has power to spare")
 _DRAWS_W = LIMITS.add("power of a vehicle that lifts", 5.0, "W", "the lightest quadcopter, of 30 g, hovers with 7 W")
+_LOOSE_DEG = LIMITS.add("attitude error that no motor holds", 15.0, "deg", "a choice: what flies holds it by far")
 _MEASURED_A = LIMITS.add("change of a current that is measured", 0.02, "A", "a choice: what is not measured stays")
 _FEWEST = 10
 _UNPOWERED_P = LIMITS.add("probability that the motors get no power", 0.95, "", "physics: lift takes power")
@@ -74,10 +76,12 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     most, least = flight.parameter("MPC_THR_MAX") or 1.0, flight.parameter("MPC_THR_MIN") or _LEAST
     lacks = (lift > min(_ALL, most - _NEAR_LEAST)) & (sinks - wanted > _OFF_MS) & (wanted < 0.0)
     flies_off = (lift < least + _NEAR_LEAST) & (wanted - sinks > _OFF_MS) & (sinks < -_RISES_MS)
-    lacking = _at_its_end(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust")
+    lacking = list(_at_its_end(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust"))
     drawn_w = drawn_while_lifting(flight)
-    for one in lacking:
-        yield _set(flight, one, "MPC_THR_MAX", -1.0) if drawn_w is None else _unpowered(flight, one, drawn_w)
+    if drawn_w is not None:
+        yield from _unpowered(flight, lacking or _lifts(flight, t, lift), drawn_w)
+    else:
+        yield from (_set(flight, one, "MPC_THR_MAX", -1.0) for one in lacking)
     for one in _at_its_end(
         flight, _End(t, flies_off, sinks, wanted), "it rises with the motors at their least", "the least"
     ):
@@ -118,19 +122,34 @@ def drawn_while_lifting(flight: Px4Flight) -> float | None:
     return power if power < _DRAWS_W else None
 
 
-def _unpowered(flight: Px4Flight, lacking: Finding, drawn_w: float) -> Finding:
+def _lifts(flight: Px4Flight, t: Floats, lift: Floats) -> list[Finding]:
+    """Where it is asked for thrust that lifts, and does not lean as it is told: without power it is carried. A current
+    that is scaled wrongly makes no vehicle lose its attitude."""
+    asked = [span for span in runs(t, lift > _LIFTS, _LASTS_S) if span[1] - span[0] >= _LASTS_S]
+    flown = [span for span in asked if _is_flown(flight, span)]
+    if not flown or flight.lean is None:
+        return []
+    off = flight.lean.error_deg[during(flown, flight.lean.t)]
+    if not len(off) or not median(off) > _LOOSE_DEG:
+        return []
+    what = f"thrust of {_LIFTS:.0%} and more is asked for from {log_time(flown[0][0])} on, and it does not lean as told"
+    return [_finding("too little thrust", (flown[0][0], flown[-1][1]), what)]
+
+
+def _unpowered(flight: Px4Flight, lacking: Iterable[Finding], drawn_w: float) -> Iterator[Finding]:
     """Thrust that does not come because nothing drives the propellers: no failure where somebody broke it off."""
-    span = next((one for one in flight.armed if one[0] <= lacking.onset_s <= one[1]), (lacking.onset_s, lacking.end_s))
-    by_hand = [way_of("px4", mode) for mode in flight.modes_during(span)][-1:] == ["manual"]
-    return replace(
-        lacking,
-        title=UNPOWERED,
-        severity="warning" if by_hand else "critical",
-        evidence=f"{drawn_w:.1f} W while lift is asked for: no power at their controllers, or no propellers; "
-        + lacking.evidence,
-        source=f"{lacking.source}, {_BATTERY}.current_a",
-        probability=_UNPOWERED_P,
-    )
+    for one in lacking:
+        span = next((armed for armed in flight.armed if armed[0] <= one.onset_s <= armed[1]), (one.onset_s, one.end_s))
+        by_hand = [way_of("px4", mode) for mode in flight.modes_during(span)][-1:] == ["manual"]
+        yield replace(
+            one,
+            title=UNPOWERED,
+            severity="warning" if by_hand else "critical",
+            evidence=f"{drawn_w:.1f} W while lift is asked for: no power at their controllers, or no propellers; "
+            + one.evidence,
+            source=f"{one.source}, {_BATTERY}.current_a",
+            probability=_UNPOWERED_P,
+        )
 
 
 def _at_its_end(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator[Finding]:
@@ -140,16 +159,21 @@ def _at_its_end(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator
         start, stop = flown[0]
         during = (end.t >= start) & (end.t <= stop)
         climbs, wanted = -float(median(end.sinks[during])), -float(median(end.wanted[during]))
-        yield Finding(
-            kind="thrust",
-            title=title,
-            onset_s=start,
-            end_s=flown[-1][1],
-            severity="warning",
-            evidence=f"{what} for {stop - start:.0f} s: it {_goes(climbs, 's')}, and is to {_goes(wanted)}",
-            source=f"{POSITION}.vz, {_WANTED}.vz, {_THRUST}",
-            probability=_TRUE_P,
-        )
+        evidence = f"{what} for {stop - start:.0f} s: it {_goes(climbs, 's')}, and is to {_goes(wanted)}"
+        yield _finding(title, (start, flown[-1][1]), evidence)
+
+
+def _finding(title: str, span: Span, evidence: str) -> Finding:
+    return Finding(
+        kind="thrust",
+        title=title,
+        onset_s=span[0],
+        end_s=span[1],
+        severity="warning",
+        evidence=evidence,
+        source=f"{POSITION}.vz, {_WANTED}.vz, {_THRUST}",
+        probability=_TRUE_P,
+    )
 
 
 def _is_heard(flight: Px4Flight, span: Span) -> bool:
