@@ -20,7 +20,7 @@ from care_core.ecosystems.px4.flight import POSITION, Px4Flight
 from care_core.ecosystems.spans import Span, during, runs, within
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
-from care_core.numbers import Floats, median
+from care_core.numbers import Floats, median, quantile
 from care_core.records import replace
 from care_core.run import shown
 from care_core.text import log_time
@@ -49,6 +49,7 @@ _NEAR_LEAST = LIMITS.add("thrust near the least", 0.02, "", "a choice: it is rou
 _LIFTS = LIMITS.add("thrust that lifts", 0.4, "", "a choice: what hovers with less has power to spare")
 _DRAWS_W = LIMITS.add("power of a vehicle that lifts", 5.0, "W", "the lightest quadcopter, of 30 g, hovers with 7 W")
 _LOOSE_DEG = LIMITS.add("attitude error that no motor holds", 15.0, "deg", "a choice: what flies holds it by far")
+_FOR_A_WHILE = LIMITS.add("share of the time in which it draws as little", 0.9, "", "a choice: a current is noisy")
 _MEASURED_A = LIMITS.add("change of a current that is measured", 0.02, "A", "a choice: what is not measured stays")
 _FEWEST = 10
 _UNPOWERED_P = LIMITS.add("probability that the motors get no power", 0.95, "", "physics: lift takes power")
@@ -109,7 +110,7 @@ def _set(flight: Px4Flight, one: Finding, end: str, way: float) -> Finding:
 
 def drawn_while_lifting(flight: Px4Flight) -> float | None:
     """The power (W) that the battery gives in the middle while thrust is asked for that lifts, where no multicopter can
-    fly on so little; None where it gives more, or the log does not measure it."""
+    fly on so little; None where it gave more for a while, as before a crash, or the log does not measure it."""
     battery, thrust = flight.table(_BATTERY, "voltage_v", "current_a"), _thrust(flight)
     if battery is None or thrust is None:
         return None
@@ -118,8 +119,9 @@ def drawn_while_lifting(flight: Px4Flight) -> float | None:
     measured = armed & (np.interp(t, *thrust) > _LIFTS) & np.isfinite(amps) & (amps >= 0.0)
     if measured.sum() < _FEWEST or float(np.ptp(amps[np.isfinite(amps)])) < _MEASURED_A:
         return None
-    power = float(median((amps * battery["voltage_v"])[measured]))
-    return power if power < _DRAWS_W else None
+    powers = (amps * battery["voltage_v"])[measured]
+    power = float(median(powers))
+    return power if power < _DRAWS_W and quantile(powers, _FOR_A_WHILE) < 2 * _DRAWS_W else None
 
 
 def _lifts(flight: Px4Flight, t: Floats, lift: Floats) -> list[Finding]:
