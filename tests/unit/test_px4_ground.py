@@ -81,14 +81,14 @@ def quaternion(w: float, x: float, name: str = "q") -> dict[str, list[tuple[floa
 
 def test_what_flew_before_it_lay_had_power() -> None:
     draws = {"voltage_v": [(0.0, 12.0)], "current_a": [(0.0, 0.05), (20.0, 15.0), (30.0, 0.05)]}
-    topics = dict(
-        vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 3)], failsafe=[(0, 0)]),
-        vehicle_local_position=states(z=[(0, 0.0)], vz=[(0, 0.0), (20, -1.5)]),
-        vehicle_local_position_setpoint=states(vz=[(0, 0.0), (20, -1.5)]),
-        vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, 0.0), (20, -0.8)]}),
-        vehicle_attitude=states(**quaternion(0.0, 1.0)),
-        vehicle_attitude_setpoint=states(**quaternion(1.0, 0.0, "q_d")),
-    )
+    topics = {
+        "vehicle_status": states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 3)], failsafe=[(0, 0)]),
+        "vehicle_local_position": states(z=[(0, 0.0)], vz=[(0, 0.0), (20, -1.5)]),
+        "vehicle_local_position_setpoint": states(vz=[(0, 0.0), (20, -1.5)]),
+        "vehicle_thrust_setpoint": states(**{"xyz[2]": [(0, 0.0), (20, -0.8)]}),
+        "vehicle_attitude": states(**quaternion(0.0, 1.0)),
+        "vehicle_attitude_setpoint": states(**quaternion(1.0, 0.0, "q_d")),
+    }
     assert UNPOWERED not in [one.title for one in found(**topics, battery_status=states(**draws))]
 
 
