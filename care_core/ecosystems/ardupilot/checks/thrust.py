@@ -67,13 +67,11 @@ def find(flight: Flight) -> Iterator[Finding]:
     spans = lasting(t, flown & (level > HOVER_MOST), _LASTS_S, gap_s=5.0)
     high = [span for span in spans if not climbs(flight, *span)]
     full = [span for span in saturated(flight) if _below(flight, *span) or not climbs(flight, *span)]
-    sinking = _sinking(flight)
-    if strained := sinking or full:
+    if strained := full or _sinking(flight):
         start = strained[0][0]
-        begin = start if sinking else min([start, *[a for a, _ in high]])
         before = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
-        found = _too_little(flight, strained, begin, before, _NEARLY_FULL if sinking else FULL, sinking)
-        yield replace(found, probability=max(found.probability, _LACKS_P)) if sinking else found
+        begin = min([start, *[a for a, _ in high]])
+        yield _too_little(flight, full, begin, before) if full else _sinks(flight, strained, before)
     elif high and seconds_in(high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
         share = 100 * float(median(level[flown]))
         evidence = f"mean throttle {share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %)"
@@ -81,26 +79,33 @@ def find(flight: Flight) -> Iterator[Finding]:
         yield _finding(flight, title, (high[0][0], high[-1][1]), "warning", evidence)
 
 
-def _too_little(
-    flight: Flight, strained: list[Span], begin: float, before: float, least: float, sinking: list[Span]
-) -> Finding:
+def _too_little(flight: Flight, full: list[Span], begin: float, before: float) -> Finding:
     """The motors give all that they have.
 
     Args:
-        strained: when they do. begin: when the throttle first was high. before: the throttle until then.
-        least: the throttle above which that is. sinking: when it sank all the same.
+        full: when they do. begin: when the throttle first was high. before: the throttle until then.
     """
-    start, end = strained[0][0], strained[-1][1]
-    below, lasted = _below(flight, start, end), seconds_in(strained)
+    start, end = full[0][0], full[-1][1]
+    below, lasted = _below(flight, start, end), seconds_in(full)
     grounded = not flight.flown and lasted > _GROUNDED_S
     lost = flight.impact_s is not None or any(code for _, code in flight.errors(BATTERY_FAILSAFE))
     since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""
-    evidence = f"throttle above {since}{100 * least:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
+    evidence = f"throttle above {since}{100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
     evidence += f", {below:.1f} m below the height wanted" if below else ""
-    evidence += f", and it sank by {_sank_m(flight, *sinking[0]):.1f} m at that" if sinking else ""
     evidence += f"; {100 * before:.0f} % before that"
-    is_grave = grounded or lost or bool(sinking) or below > 2 * _BELOW_M
-    return _finding(flight, "too little thrust", (begin, end), "critical" if is_grave else "warning", evidence)
+    severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
+    return _finding(flight, "too little thrust", (begin, end), severity, evidence)
+
+
+def _sinks(flight: Flight, sinking: list[Span], before: float) -> Finding:
+    """It sinks though the motors give nearly all."""
+    start, end = sinking[0][0], sinking[-1][1]
+    evidence = (
+        f"throttle above {100 * _NEARLY_FULL:.0f} % for {seconds_in(sinking):.0f} s from {log_time(start, 0)} on, and "
+        f"it sank by {_sank_m(flight, *sinking[0]):.1f} m at that; {100 * before:.0f} % before that"
+    )
+    found = _finding(flight, "too little thrust", (start, end), "critical", evidence)
+    return replace(found, probability=max(found.probability, _LACKS_P))
 
 
 def _finding(flight: Flight, title: str, span: Span, severity: Severity, evidence: str) -> Finding:
