@@ -20,6 +20,10 @@ READS = {
 }
 _TURNS = 6
 """Changes to and fro from which on two take turns: a restart, or a clock that is set, is one."""
+_MOSTLY = 0.8
+"""Share of the changes that go the other way than the one before: between two there is no other."""
+_BACK = 2
+"""Times that each of the two is where it was two changes before."""
 _BOOT_S = 3.0
 """Clocks since the start farther apart than any delay of a link."""
 _APART_M = 30.0
@@ -41,7 +45,13 @@ def sharing(tables: Mapping[str, Table]) -> str:
 
 
 def _turns(values: Floats, apart: float) -> bool:
-    """Whether a series goes to and fro between two levels, again and again."""
+    """Whether a series goes to and fro between two levels, again and again. A link that delays leaves one level for
+    many others, and a restart comes back to none."""
     steps = np.diff(values)
-    large = steps[np.abs(steps) > apart]
-    return len(large) >= _TURNS and bool(np.sum(np.sign(large[1:]) != np.sign(large[:-1])) >= _TURNS - 1)
+    rows = np.flatnonzero(np.abs(steps) > apart)
+    large = steps[rows]
+    if len(large) < _TURNS or np.mean(np.sign(large[1:]) != np.sign(large[:-1])) < _MOSTLY:
+        return False
+    reached = values[rows + 1]
+    is_back = np.abs(reached[2:] - reached[:-2]) < apart / 2
+    return all(np.sum(is_back[first::2]) >= _BACK for first in (0, 1))

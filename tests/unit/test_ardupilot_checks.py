@@ -16,7 +16,7 @@ from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import expanded
-from care_core.ecosystems.findings import NO_BATTERY, Finding, every_finding
+from care_core.ecosystems.findings import DROPPED, NO_BATTERY, Finding, every_finding
 from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.ecosystems.spans import runs
 from care_core.logs.base import Table
@@ -1328,6 +1328,23 @@ def _drop(made: Made, at_s: float) -> None:
     left = np.where(made.t > at_s, np.maximum(12.0 - 5 * (made.t - at_s) ** 2, 0.0) / 12.0, 1.0)
     made.table["POS"]["RelHomeAlt"] *= left
     made.table["CTUN"]["Alt"] *= left
+
+
+@pytest.mark.parametrize(("falls_s", "is_told"), [(50.0, True), (None, False), (44.0, False)])
+def test_what_is_disarmed_in_the_air_and_falls_is_told(falls_s: float | None, is_told: bool) -> None:
+    made = Made()
+    made.rows["ARM"][1] = (50.0, {"ArmState": 0.0, "Forced": 0.0})
+    if falls_s is not None:
+        _drop(made, falls_s)
+    assert (DROPPED in [one.title for one in made.find()]) is is_told
+
+
+def test_a_height_that_is_set_anew_when_it_is_disarmed_is_no_fall() -> None:
+    made = Made()
+    made.rows["ARM"][1] = (50.0, {"ArmState": 0.0, "Forced": 0.0})
+    for table, name in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[table][name][made.after(51.0)] = 0.0
+    assert DROPPED not in [one.title for one in made.find()]
 
 
 def test_what_keeps_its_height_without_motors_stands_whatever_its_barometer_says() -> None:

@@ -22,6 +22,7 @@ from care_core.logs.file_windows import FileArray
 from care_core.logs.mavlink import MavlinkLog
 from care_core.logs.mavlink_packets import find_packets
 from care_core.logs.opening import open_log
+from care_core.logs.shared_id import _turns
 from care_core.profile.store import load_profile
 from tests.groundstation import write_tlog
 
@@ -344,3 +345,10 @@ def _booted(packet: bytes, later_s: float) -> bytes:
         return packet
     message.time_boot_ms = max(0, int(message.time_boot_ms - 1000 * later_s) % 2**32)
     return packet[:8] + bytes(message.pack(mavlink.MAVLink(None, message.get_srcSystem(), message.get_srcComponent())))
+
+
+def test_a_link_that_falls_behind_and_restarts_are_one_vehicle() -> None:
+    begun = np.cumsum([0.0, -290.0, -200.0, 4.5, -28.0, 5.0, -42.0, 3.5, 4.0, 3.5, 4.0, 3.5, 4.5])
+    assert not _turns(np.repeat(begun, 5), 3.0)
+    assert not _turns(np.repeat([0.0, -3.5, 0.0, -8.0, 0.0, -5.5, 0.0, -12.0, 0.0], 5), 3.0)
+    assert _turns(np.tile([0.0, 0.0, 40.0], 10), 3.0)

@@ -1,4 +1,4 @@
-"""Motors that somebody stopped in the air by the emergency switch."""
+"""Motors that stop in the air: by the emergency switch, or since the vehicle is disarmed."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot import dropped
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import STOPPED, Finding
+from care_core.ecosystems.findings import DROPPED, STOPPED, Finding
 from care_core.ecosystems.spans import within
 from care_core.logs.base import Wanted
 
 _CHANNELS = range(5, 15)
 READS: Wanted = {"EV": ("Id",), "RCIN": tuple(f"C{n}" for n in _CHANNELS)}
-LIMITS = Limits()
+LIMITS = Limits(dropped.LIMITS)
 _HIGH_US = LIMITS.add("pulse of a switch that is on", 1800.0, "us", "RC_Channel.h: AUX_SWITCH_PWM_TRIGGER_HIGH")
 _OFF_US = LIMITS.add("pulse of a switch that is off", 1200.0, "us", "RC_Channel.h: AUX_SWITCH_PWM_TRIGGER_LOW")
 _ALOFT_M = LIMITS.add("height", 1.0, "m", "a choice: lower, a landing leg may touch")
@@ -25,7 +26,7 @@ _STOPPED, _EMERGENCY_STOP = 54, 31
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """The first time that the switch was thrown while it flew."""
+    """The first time that the switch was thrown while it flew; else that it was disarmed there."""
     if not (flight.is_copter or flight.kind == "quadplane"):
         return
     thrown = sorted((*flight.events(_STOPPED), *_switched(flight)))
@@ -40,6 +41,18 @@ def find(flight: Flight) -> Iterator[Finding]:
             severity="critical",
             evidence="its switch was thrown" + ("" if height_m is None else f", {height_m:.1f} m up"),
             source="EV 54; RCIN of the switch with option 31",
+            suspect="operation",
+            probability=0.9,
+        )
+    elif (drop := dropped.dropped(flight)) is not None:
+        yield Finding(
+            kind="crash",
+            title=DROPPED,
+            onset_s=drop.time_s,
+            end_s=flight.end_s,
+            severity="critical",
+            evidence=f"{drop.height_m:.1f} m up, and it lost {drop.fell_m:.1f} m of that within a second or two",
+            source="ARM; the vehicle's height",
             suspect="operation",
             probability=0.9,
         )
@@ -65,4 +78,10 @@ def _switched(flight: Flight) -> Iterator[float]:
             yield from heard.t[1:][(pulse[1:] > _HIGH_US) & (pulse[:-1] < _OFF_US)].tolist()
 
 
-CHECK = Check("kill switch", "motors stopped in the air by the emergency switch", READS, LIMITS, find)
+CHECK = Check(
+    "kill switch",
+    "motors that stop in the air: by the emergency switch, or since the vehicle is disarmed",
+    READS,
+    LIMITS,
+    find,
+)

@@ -20,6 +20,9 @@ from care_core.text import log_time, shortened
 WAYPOINT_TOLERANCE_M = 5.0
 _FAILSAFE_OF = re.compile(r"battery|radio|throttle|GCS|EKF|terrain|fence|leak|GPS|vibration", re.IGNORECASE)
 """What a failsafe's message speaks of."""
+_BEGUN_S, _AT_ONCE_S = 1.0, 2.0
+"""An arming so soon after the log begins may be older; a failsafe so soon after an arming was on before: BATT_LOW_TIMER
+alone is 10 s."""
 _LONGEST = 60
 """Characters of a message that stands in a clause."""
 
@@ -79,6 +82,8 @@ def event_clause(mission: Mission, kind: str) -> str:
     if not found:
         return ""
     time_s, words = min(found, key=lambda one: one[0])
+    if words.endswith(" failsafe") and mission.start_s > _BEGUN_S and time_s - mission.start_s < _AT_ONCE_S:
+        return f"it was armed with a {words} on"
     return f"{words} at {log_time(time_s)}"
 
 
