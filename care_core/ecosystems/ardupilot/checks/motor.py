@@ -356,7 +356,8 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     if most.mean() < _MOSTLY:  # asked for in turn with others: an oscillation
         return
     around = (outputs.t > lost - 2.0) & (outputs.t <= lost + 1.0)
-    begin = outputs.t[around][outputs.share(around)[n] > _AT_LIMIT]
+    shares = outputs.share(around)
+    begin = outputs.t[around][(shares[n] > _AT_LIMIT) & (median(np.delete(shares, n, axis=0), axis=0) < _AT_LIMIT)]
     yield _finding(
         outputs.motors[n], "gave too little thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0,
         "critical",
