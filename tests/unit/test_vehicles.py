@@ -12,6 +12,7 @@ from care_core.ecosystems.vehicles import (
     error_kind,
     error_words,
     event_words,
+    is_simulated,
     mode_name,
     mode_number,
     motors_of,
@@ -275,3 +276,10 @@ def test_telemetry_names_the_firmware_by_its_heartbeats() -> None:
     built = Built("multicopter", "ArduCopter V4.5.5 (cff126f5)")
     assert facts_of(["Hawk V4.5.5 (cff126f5)"], built)["firmware"].endswith(", which is ArduCopter V4.5.5 (cff126f5)")
     assert facts_of([], built)["firmware"] == "ArduCopter V4.5.5 (cff126f5)"
+
+
+@pytest.mark.parametrize(
+    ("hardware", "hitl", "simulated"), [("PX4_SITL", 0, True), ("FMU", 1, True), ("FMU", 0, False)]
+)
+def test_a_board_that_flies_in_a_simulator_is_simulated(hardware: str, hitl: int, simulated: bool) -> None:
+    assert is_simulated({"stack": "PX4", "hardware": hardware}, {"SYS_HITL": float(hitl)}) is simulated

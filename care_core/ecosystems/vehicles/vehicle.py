@@ -59,9 +59,10 @@ def flies(kind: Kind) -> bool:
 
 def is_simulated(facts: Mapping[str, str], settings: Driven) -> bool:
     """Whether the log says that a simulator flew it: only ArduPilot's builds of it have parameters of the simulation,
-    and PX4's name themselves as the hardware. A board with PX4 has some of those parameters, too."""
+    and PX4's name themselves as the hardware. A board with PX4 has some of those parameters, too; SYS_HITL says that
+    it flies in a simulator, of another computer (1) or of its own (2)."""
     if facts.get("stack") == "PX4":
-        return "SITL" in facts.get("hardware", "")
+        return "SITL" in facts.get("hardware", "") or code(settings, "SYS_HITL") in (1, 2)
     return any(name.startswith(SIMULATOR_PREFIX) for name in settings)
 
 
