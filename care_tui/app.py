@@ -172,7 +172,8 @@ class CareApp(App[int], inherit_bindings=False):
         if self.is_held:
             self.is_held = False
             self._held.close()
-            self.screen.check_idle()
+            if self.screen_stack:  # none is left as the app closes
+                self.screen.check_idle()
 
     def on_resize(self, event: Resize) -> None:
         self.link.width = event.size.width

@@ -299,7 +299,7 @@ def test_what_flies_above_its_home_all_along_took_off_before_the_log_begins(
 @pytest.mark.parametrize(
     ("said_s", "said", "state", "named"),
     [
-        (5.0, "PreArm: Radio failsafe on", 5.0, "radio failsafe at 10.0 s"),
+        (5.0, "PreArm: Radio failsafe on", 5.0, "it was armed with a radio failsafe on"),
         (5.0, "", 5.0, "failsafe told by the heartbeat at 10.0 s"),
         (5.0, "Internal Errors 0x100000", 5.0, ""),
         (12.0, "Low battery", 4.0, "battery failsafe at 12.0 s"),
