@@ -67,6 +67,9 @@ def _climb_parted(flight: Flight, heard: tuple[Floats, Floats]) -> Finding | Non
         or len(table) < _FEWEST
         or not flight.airborne
         or any(np.mean(np.diff(one) <= 0.0) > _STANDS for one in (table.t, heard[0]))
+        or any(
+            float(median(np.diff(one))) > _CLIMB_LASTS_S / 3 for one in (table.t, heard[0])
+        )  # too few to tell a rate
     ):
         return None
     t, half = table.t, _CLIMB_LASTS_S / 2
