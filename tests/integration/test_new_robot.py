@@ -71,7 +71,7 @@ def test_every_command_of_the_tutorial_runs(tmp_path: Path, tmp_path_factory: py
                 reduced(tmp_path / "courier" / "campaign.yaml")
     assert "4 of 4 runs have a log" in said["care collect courier/campaign.yaml"]
     triage = next(text for command, text in said.items() if command.startswith("care triage late.bag"))
-    assert re.search(r"FAULT: mission_time", triage)
+    assert re.search(r"FAULT: too slow: ", triage)
     assert re.search(r"Change slow_distance 0\.8 -> 0\.\d+", triage)
     verified = next(text for command, text in said.items() if command.startswith("care verify"))
     assert "the change was made" in verified
