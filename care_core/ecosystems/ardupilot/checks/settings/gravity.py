@@ -10,6 +10,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Limits
 from care_core.ecosystems.spans import Span, during, runs
+from care_core.geodesy import GRAVITY
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Floats, median
 
@@ -20,7 +21,7 @@ UPRIGHT_DEG = LIMITS.add("gravity at the bottom of a board", 20.0, "deg", "a cho
 TURNS_DPS = LIMITS.add("turning at rest", 3.0, "deg/s", "flights whose gyros are calibrated: 1.0 at most")
 REST_S = LIMITS.add("time at rest", 2.0, "s", "a choice: a landing that bounces rests for less")
 STILL_DEG = LIMITS.add("gravity that stays where it is, at rest", 1.0, "deg", "a third of what 3 deg/s turn meanwhile")
-_GYROS, _GRAVITY, _OFF, _SHAKEN, _RECORDS_AT_REST = ("GyrX", "GyrY", "GyrZ"), 9.81, 2.5, 1.0, 6
+_GYROS, _OFF, _SHAKEN, _RECORDS_AT_REST = ("GyrX", "GyrY", "GyrZ"), 2.5, 1.0, 6
 """m/s^2 by which what rests may be off gravity, not calibrated, and be shaken."""
 FEWEST, _IDLES = 3, 0.05
 """Records, and the throttle above which motors may lift."""
@@ -83,7 +84,7 @@ def _rest(part: Table) -> Rest | None:
     halves = [felt[:, rows].mean(axis=1) for rows in np.array_split(np.arange(len(part)), 2)]
     mean = felt.mean(axis=1)
     size = float(np.linalg.norm(mean))
-    if abs(size - _GRAVITY) > _OFF or float(felt.std(axis=1).max()) > _SHAKEN:
+    if abs(size - GRAVITY) > _OFF or float(felt.std(axis=1).max()) > _SHAKEN:
         return None
     down = mean / size
     rate = np.degrees([part[axis].mean() for axis in _GYROS])
