@@ -91,11 +91,19 @@ def figures(value: float, digits: int = 3) -> str:
     return f"{float(f'{value:.{digits}g}'):.15g}"
 
 
+_INSIDE_FIGURE = re.compile(
+    r"(?<=\d) (?=(?:[mu]?s|[ckm]?m|m/s\S*|[mk]?V|m?Ah?|Wh?|k?Hz|kg|deg\S*|rad\S*|%)(?![\w/]))"
+    r"|(?<=\d s) (?=\(\d+:\d)"
+)
+"""The space between a number and its unit, and before its minutes: no line ends there."""
+
+
 def wrapped(text: str, first: str = "", rest: str | None = None, width: int = WIDTH) -> list[str]:
     """The text, made safe, in lines of at most `width` columns; `rest` indents the later ones, as wide as `first` if
     not given."""
     indent = " " * len(first) if rest is None else rest
-    lines = textwrap.wrap(clean(text), width, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+    together = _INSIDE_FIGURE.sub("\u00a0", clean(text))
+    lines = textwrap.wrap(together, width, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
     return [line.replace("\u00a0", " ") for line in lines]  # what must stand on one line was held together by them
 
 

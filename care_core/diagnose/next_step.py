@@ -30,7 +30,7 @@ from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, is_simulated, vehicle_of, vehicle_of_run
 from care_core.ecosystems.way_back import way_back
 from care_core.logs.formats import MAVLINK_TLOG, format_named
-from care_core.metadata.causal_map import SET_BY_HAND, meaning_of
+from care_core.metadata.causal_map import BUILT_AS, SET_BY_HAND, meaning_of
 from care_core.run import Run, shown
 from care_core.text import listed
 
@@ -195,7 +195,7 @@ def _leads(first: Hypothesis) -> bool:
 
 def _undone(diagnosis: Diagnosis) -> str:
     """What can be put right at once, empty where nothing is said to be that."""
-    run, findings = diagnosis.run, diagnosis.health.findings
+    findings = diagnosis.health.findings
     part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
     leading = first_named(diagnosis.hypotheses)
     named = leading if leading is not None and leading.what == "parameter" else None
@@ -209,20 +209,34 @@ def _undone(diagnosis: Diagnosis) -> str:
         return CLEAR_REFUSAL.format(why=refused.title.removeprefix(REFUSED))
     if named is not None and _is_kept(named.name, diagnosis):
         return f"let {named.name} change as well: without it nothing is likely enough"
-    said = None if named is None else next((one for one in findings if _says(one, named.name)), None)
-    if named is not None and _protects(named.name, run):
-        return _looked_at(named.name, diagnosis)
-    if named is not None and said is not None:
-        return _put_right(_put_back_with(named.name, said, findings), findings, run)
-    if named is not None and named.name not in diagnosis.run.config:
-        return _looked_at(named.name, diagnosis)
-    return ""
+    return "" if named is None else _set_right(named.name, diagnosis)
+
+
+def _set_right(name: str, diagnosis: Diagnosis) -> str:
+    """What to do with a parameter that leads and whose change is not advised; empty where its profile knows no more."""
+    run, findings = diagnosis.run, diagnosis.health.findings
+    said = next((one for one in findings if _says(one, name)), None)
+    if said is not None and not _protects(name, run):
+        return _as_built(name, said, run) or _put_right(_put_back_with(name, said, findings), findings, run)
+    return _looked_at(name, diagnosis) if name not in run.config or _protects(name, run) else ""
 
 
 def _protects(name: str, run: Run) -> bool:
     """Whether a parameter is a protection: nobody is told to make one looser."""
     meaning = meaning_of(name, vehicle_of_run(run).kind)
     return meaning is not None and meaning.role == "safety"
+
+
+def _as_built(name: str, said: Finding, run: Run) -> str:
+    """What to do with a parameter that says how the vehicle is built, where a refusal knows no more than its default;
+    empty for any other."""
+    meaning, setting = meaning_of(name, vehicle_of_run(run).kind), run.settings.get(name)
+    if said.kind != "prearm" or meaning is None or meaning.part != BUILT_AS or setting is None:
+        return ""
+    if setting.default != dict(said.wanted).get(name):
+        return ""
+    how = f"it is {shown(setting.value)}, and the default is {shown(setting.default)}"
+    return f"set {name} to how this vehicle is built: {how}"
 
 
 def _put_right(names: Sequence[str], findings: Iterable[Finding], run: Run) -> str:

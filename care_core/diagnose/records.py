@@ -313,6 +313,13 @@ class OutsideSuspect(Record):
     """Whether flights with such a value were lost in this way."""
     text: str
     """Value, default, and what speaks against it."""
+    is_last_good: bool = False
+    """Whether it goes back to the last good run's value, not to the firmware's default."""
+
+    @property
+    def back_in_words(self) -> str:
+        """What to put it back to, and whose value that is."""
+        return f"{shown(self.back)} in the good run" if self.is_last_good else f"default {shown(self.back)}"
 
 
 class ParameterChange(Record):

@@ -127,7 +127,7 @@ def diagnose(
         why_this=advised.why or _why_this(fix, as_driven, hypotheses, faults),
         notes=notes_of(failed, broken, fix if advised.lead is None else None, as_driven),
         missions=judged.missions,
-        rivals=circumstances(run, query, schema) if unsure else (),
+        rivals=circumstances(run, query, schema) if unsure and advised.lead is None else (),
         tell_more=_tell_more(failed, faults, advised, promise) if unsure and not any(unheard) else (),
         health=health,
         hypotheses=hypotheses,

@@ -151,10 +151,8 @@ class Advice(Record):
     @property
     def _sure(self) -> str:
         """How likely it is the cause, and a warning where training says little of that."""
-        if self.confidence is None:
-            return ""
         if self.cause is None:
-            return f" ({self.confidence} confidence in the cause)"
+            return "" if self.confidence is None else f" ({self.confidence} confidence in the cause)"
         together = " together" if ", " in self.change and not self.alone else ""
         doubt = ", weak training support" if self.confidence == "low" else ""
         alone = f"{self.alone} " if self.alone else ""
@@ -294,15 +292,23 @@ def compose(
     """The verdict out of what was judged and found; `profile` is empty where none fits. `others`: number and reason of
     the other missions of the log that failed."""
     status = status_of({one.status for one in objectives}, {one.severity for one in findings}, fit.verdict)
+    failed = clean(_failed(status, fit.verdict, objectives, findings, " in this run" if others else ""))
     return Verdict(
         fit=clean(fit_line(profile, fit, LINES)),
         status=status,
-        failed=clean(_failed(status, fit.verdict, objectives, findings, " in this run" if others else "")),
-        advice=advice,
+        failed=failed,
+        advice=replace(advice, why=_but_for(failed, advice.why), refusal=_but_for(failed, advice.refusal)),
         reasons=reasons,
         next_step=clean(next_step),
         others=clean(_others(others)),
     )
+
+
+def _but_for(headline: str, text: str) -> str:
+    """A text without the end that the headline says in the same words."""
+    told, clauses = headline.casefold(), text.split(": ")
+    ends = (index for index in range(len(clauses)) if ": ".join(clauses[index:]).casefold() in told)
+    return ": ".join(clauses[: next(ends, len(clauses))])
 
 
 def _others(failed: Sequence[tuple[int, str]]) -> str:

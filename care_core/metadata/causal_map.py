@@ -27,6 +27,8 @@ that moves no vehicle (logs, lights, cameras, links, names)."""
 FROM_FLIGHTS: frozenset[Role] = frozenset(("choice",))
 """Roles of what flights of other vehicles speak for, and a report may therefore set: how a vehicle is built, wired and
 calibrated, and what protects it, is set by nobody but its operator."""
+BUILT_AS = "frame"
+"""The part whose parameters say how the vehicle is built, which its operator alone knows, whatever the default is."""
 OF_THIS_VEHICLE: frozenset[Role] = frozenset(("wiring", "calibration"))
 """Roles of what is right for one vehicle alone, and off the default on every sound one."""
 SET_BY_HAND: frozenset[Role] = frozenset(("choice", "wiring"))

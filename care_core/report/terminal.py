@@ -9,7 +9,7 @@ from pathlib import Path
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
-from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode, told_in_full
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, PathNode, first_named, told_in_full
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
 from care_core.report.health import EVENTS_SHOWN, finding_lines, reason_lines, telling, timeline_lines
 from care_core.report.shared_causes import together
@@ -108,8 +108,13 @@ def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _explained(diagnosis: Diagnosis) -> list[Sequence[Fault]]:
-    """Faults that share their causes together; none where no profile could name any."""
-    return [] if diagnosis.profile.fit.verdict == "no" else list(together(diagnosis.faults, _paths))
+    """Faults that share their causes together; none where no profile could name any, or a parameter explains them that
+    none holds."""
+    if diagnosis.profile.fit.verdict == "no":
+        return []
+    led = first_named(diagnosis.hypotheses)
+    is_outside = led is not None and led.what == "parameter"
+    return [faults for faults in together(diagnosis.faults, _paths) if faults[-1].causes or not is_outside]
 
 
 def _paths(fault: Fault) -> list[list[str]]:

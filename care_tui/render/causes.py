@@ -71,7 +71,7 @@ def hypothesis_item(
     when = "" if finding is None else f"  from {seconds(finding.onset_s)}"
     suspect = next((s for s in outside if s.name == one.name), None)
     if suspect is not None:
-        when = f"  {shown(suspect.value)}, usually {shown(suspect.back)}"
+        when = f"  {shown(suspect.value)}, {suspect.back_in_words}"
     words = hypothesis_text(one, [finding] if finding else ())
     return Content.assemble(_share(one.probability, glyphs), text(words, "bold" if one.name else ""), text(when))
 

@@ -260,6 +260,23 @@ def test_the_value_that_a_finding_wants_is_told_with_its_command_but_of_a_protec
     assert next_step(told, has_failed=True).startswith(says)
 
 
+@pytest.mark.parametrize(
+    ("kind", "says"),
+    [
+        ("prearm", "set FRAME_TYPE to how this vehicle is built: it is 15, and the default is 0"),
+        ("takeoff", "set FRAME_TYPE to 0"),
+    ],
+)
+def test_a_refusal_knows_no_more_of_how_a_vehicle_is_built_than_the_default(kind: FindingKind, says: str) -> None:
+    check = Finding(
+        kind, "arming was refused: Check frame type", 1.7, 9.0, "critical", "", "", "parameter", 0.9,
+        parameters=("FRAME_TYPE",), wanted=(("FRAME_TYPE", 0.0),),
+    )  # fmt: skip
+    told = replace(failed(check), hypotheses=(Hypothesis("parameter", "FRAME_TYPE", 0.96),))
+    settings = {"FRAME_TYPE": Setting("FRAME_TYPE", 15.0, "PARM", 0.0)}
+    assert next_step(replace(told, run=replace(told.run, settings=settings)), has_failed=True).startswith(says)
+
+
 def test_of_two_motors_that_were_switched_off_both_are_switched_on() -> None:
     off = [
         Finding(

@@ -252,7 +252,7 @@ def test_what_flights_lost_is_advised_but_a_calibration_is_looked_at() -> None:
     offset = OutsideSuspect("INS_ACCOFFS_X", 3.5, 0.0, 0.8, "calibration", True, "")
     found = lead("INS_ACCOFFS_X", 3.5, [], offset)
     assert not found.is_advised  # type: ignore[attr-defined]
-    assert check_first(found) == "check first INS_ACCOFFS_X 3.5 (usually 0)"  # type: ignore[arg-type]
+    assert check_first(found) == "check first INS_ACCOFFS_X 3.5 (default 0)"  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["BATT_LOW_MAH", "FENCE_RADIUS", "ARMING_CHECK", "FS_EKF_THRESH"])
@@ -366,7 +366,9 @@ def test_the_value_that_every_screening_flight_had_is_harmless() -> None:
 
 
 def test_what_the_log_shows_is_changed_without_odds_where_no_objective_could_be_judged() -> None:
-    lead = Advisable("SERVO3_MAX", 1620.0, 2000.0, 0.67, "an output ends", is_found=True, is_advised=True)
+    lead = Advisable(
+        "SERVO3_MAX", 1620.0, 2000.0, "should be 2000", 0.67, "an output ends", is_found=True, is_advised=True
+    )
     run = made_run()
     rover = replace(run, log=replace(run.log, facts=ROVER))
     fix = shown_fix(lead, rover)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.text import LONG_S, but_for_numbers, cell, log_time, log_times, seconds, times_until
+from care_core.text import LONG_S, but_for_numbers, cell, log_time, log_times, seconds, times_until, wrapped
 
 CORE = Path(__file__).parents[2] / "care_core"
 
@@ -77,3 +77,14 @@ def test_no_other_clock_is_used_where_the_core_writes_text() -> None:
         if "seconds" in [name.name for name in node.names]
     ]
     assert users == ["axes.py"]
+
+
+@pytest.mark.parametrize("figure", ["1.8 s", "109.5 s (1:49)", "12 m/s", "3500 mAh", "19 %", "12.6 V", "400 Hz"])
+def test_no_line_ends_between_a_number_and_its_unit(figure: str) -> None:
+    for width in range(20, 40):
+        assert any(figure in line for line in wrapped(f"the vehicle was seen {figure}, and that is all", width=width))
+
+
+def test_a_number_is_held_to_nothing_but_its_unit() -> None:
+    assert wrapped("it came 53 times", width=12) == ["it came 53", "times"]
+    assert wrapped("motor 1 slower", width=8) == ["motor 1", "slower"]

@@ -195,6 +195,18 @@ def test_a_refusal_to_arm_is_told_once() -> None:
     assert verdict_on([refused], [finding]).headline == "FAULT: arming was refused: Compass not healthy"
 
 
+def test_what_the_headline_says_is_not_said_again_beside_the_change() -> None:
+    why = "arming was refused: Compass not healthy"
+    refused = [ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", why)]
+    first = Advice(refusal=f"check first COMPASS_TYPEMASK 3 (default 0): {why}")
+    assert compose("copter", FITS, refused, (), (), first, "").advice.refusal.endswith("COMPASS_TYPEMASK 3 (default 0)")
+    changed = Advice("A 1 -> 0", 0.8, 0.1, cause=0.97, why=why)
+    told = str(compose("copter", FITS, refused, (), (), changed, "").advice)
+    assert told == "Change A 1 -> 0 (97% the cause): 80% probability that all objectives are met; as driven 10%"
+    shown = replace(changed, why=f"this run shows it: {why}")
+    assert str(compose("copter", FITS, refused, (), (), shown, "").advice).endswith("; this run shows it")
+
+
 def test_one_reason_for_all_that_could_not_be_judged_is_the_first_line() -> None:
     def unknown(reason: str) -> ObjectiveResult:
         return ObjectiveResult(SUCCESS, None, SUCCESS.threshold, "not_evaluated", reason)

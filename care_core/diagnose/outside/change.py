@@ -9,16 +9,14 @@ from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect, first_na
 from care_core.ecosystems.findings import Finding, every_finding
 from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.ecosystems.vehicles.vehicle import Kind, Vehicle
-from care_core.metadata.causal_map import FROM_FLIGHTS, meaning_of
+from care_core.metadata.causal_map import BUILT_AS, FROM_FLIGHTS, meaning_of
 from care_core.metadata.fact import Fact
 from care_core.metadata.firmware import fact_of, is_code
 from care_core.metadata.navigation import mended
 from care_core.records import Record, replace
-from care_core.run import Run, shown
+from care_core.run import Run, Setting, shown
 from care_core.variables import Change, Role, ValueType, Variable
 
-BUILT_AS = "frame"
-"""The part whose parameters say how the vehicle is built, which its operator alone knows, whatever the default is."""
 ENOUGH = 0.4
 """Probability of a parameter from which its change is advised: nothing else is then as likely by far."""
 
@@ -31,6 +29,8 @@ class Advisable(Record):
     value: float
     wanted: float | None
     """None where only that its value is wrong follows."""
+    wanted_in_words: str
+    """The same and whose value it is, empty where nothing says it."""
     probability: float
     why: str
     is_found: bool
@@ -60,6 +60,7 @@ def leading_outside(
         return None
     measured = None if finding is None else dict(finding.wanted).get(first.name)
     wanted = suspect.back if measured is None and suspect is not None else measured
+    in_words = "" if wanted is None else _in_words(wanted, suspect, setting)
     if finding is None and suspect is None:
         return None
     is_learned = suspect is not None and suspect.is_learned and meaning is not None and meaning.role in FROM_FLIGHTS
@@ -68,11 +69,19 @@ def leading_outside(
         first.name,
         float(setting.value),
         wanted,
+        in_words,
         first.probability,
         finding.title if finding is not None else suspect.text if suspect is not None else "",
         is_found=finding is not None,
         is_advised=is_carried and wanted not in (None, setting.value) and first.probability >= ENOUGH,
     )
+
+
+def _in_words(wanted: float, suspect: OutsideSuspect | None, setting: Setting) -> str:
+    """What a parameter should be, and whose value that is where the log does not measure it."""
+    if suspect is not None and suspect.back == wanted:
+        return suspect.back_in_words
+    return f"{'default' if setting.default == wanted else 'should be'} {shown(wanted)}"
 
 
 def outside_fix(one: Advisable, odds: float, run: Run, beside: Sequence[Change] = ()) -> Fix:
@@ -152,5 +161,5 @@ def check_first(one: Advisable) -> str:
     if one.is_found and one.why.startswith(one.name):  # it was changed on the way: no single value was driven
         return f"check first: {one.why}"
     why = f": {one.why}" if one.why and not one.why.startswith(f"{one.name} {shown(one.value)}") else ""
-    usual = "" if one.wanted is None else f" (usually {shown(one.wanted)})"
+    usual = f" ({one.wanted_in_words})" if one.wanted_in_words else ""
     return f"check first {one.name} {shown(one.value)}{usual}{why}"

@@ -97,7 +97,9 @@ def _block(name: str) -> str:
 def _suspect(one: OffParameter, weight: float, flown: str) -> OutsideSuspect:
     before = f"; it was {shown(one.last_good)} in the good run" if one.is_changed and one.last_good is not None else ""
     text = f"{one.name} {shown(one.value)} (default {shown(one.default)}){before}{': ' if flown else ''}{flown}"
-    return OutsideSuspect(one.name, one.value, one.back, weight, one.meaning.role, bool(flown), text)
+    return OutsideSuspect(
+        one.name, one.value, one.back, weight, one.meaning.role, bool(flown), text, one.last_good is not None
+    )
 
 
 def phases_of(run: Run, has_begun: bool) -> frozenset[Read]:
