@@ -8,7 +8,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.ecosystems.findings import Event, Finding, Health, Severity
-from care_core.records import Record
+from care_core.records import Record, replace
 from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.text import seconds
@@ -142,8 +142,8 @@ def fit_rows(diagnosis: Diagnosis, advice: Sequence[str]) -> list[Row]:
 
 
 def hypothesis_rows(one: Hypothesis, finding: Finding | None, notes: Sequence[str] = ()) -> list[Row]:
-    """All about an explanation, with the notes of the diagnosis that name it."""
-    rows = [] if finding is None else [*finding_rows(finding), Row(Content())]
+    """All about an explanation but how its finding was seen, which stands before it, with the notes that name it."""
+    rows = [] if finding is None else [*finding_rows(replace(finding, evidence="")), Row(Content())]
     if one.what in ("hardware", "world"):
         rows.append(warning("Not a parameter", "if this is the cause, changing parameters will not help"))
     said = [warning("Note", note) for note in notes if one.what == "parameter" and one.name and one.name in note]

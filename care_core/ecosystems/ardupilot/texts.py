@@ -65,7 +65,7 @@ class Refusal(NamedTuple):
 def refusal_of(time_s: float, text: str) -> Refusal | None:
     """The refusal of arming that a text is, None where it is none."""
     match = _REFUSAL.match(text)
-    return None if match is None else Refusal(time_s, text, match["why"], match["before"] is None)
+    return None if match is None else Refusal(time_s, text, match["why"].rstrip(), match["before"] is None)
 
 
 def in_full(refusals: Sequence[Refusal]) -> tuple[Refusal, ...]:
