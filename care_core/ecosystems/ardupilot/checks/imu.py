@@ -36,6 +36,7 @@ READS: Wanted = {
     "IMU": (*GYROS, *ACCELEROMETERS, "GH", "AH"),
     "VIBE": ("VibeX", "VibeY", "VibeZ"),
     "XKF1": ("GX", "GY", "GZ"),
+    "ATT": ("Roll", "Pitch"),
 }
 
 LIMITS = Limits(gravity.LIMITS)
@@ -113,12 +114,14 @@ _PLANE_SHAKEN_DPS = LIMITS.add(
 )
 _FAILED_P = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
 _OFFSET_P = LIMITS.add("probability of a gyro that is offset at rest", 0.9, "", "nothing turns while gravity stays")
+_UPSIDE_DOWN_P = LIMITS.add("probability of gravity felt upside down", 0.95, "", "attitude and gravity contradict")
 _APART_P = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
     """What is wrong with the inertial sensors before anything was lost."""
     yield from _offset(flight)
+    yield from _upside_down(flight)
     lost = math.inf if flight.lost_control_s is None else flight.lost_control_s - _TURNS_OVER_S
     sensors = [table.where(flight.watch(table.t) & (table.t < lost)) for table in flight.all("IMU", *GYROS)]
     sensors = [table for table in sensors if len(table) >= 5]
@@ -168,6 +171,34 @@ def _offset(flight: Flight) -> Iterator[Finding]:
             ),
             source="IMU.GyrX, GyrY, GyrZ against AccX, AccY, AccZ with the motors down",
             probability=_OFFSET_P,
+        )
+
+
+def _upside_down(flight: Flight) -> Iterator[Finding]:
+    """Accelerometers that feel gravity at the top of a copter that stands upright by its own attitude: climbing feels
+    like falling, and its height is held with the wrong sign. What its motors lift meanwhile pulls the same way."""
+    ends = min((start for start, _ in flight.airborne), default=0.0)
+    attitude = flight.one("ATT", "Roll", "Pitch")
+    sensors = [table.between(0.0, ends) for table in flight.all("IMU", *gravity.AXES)]
+    stands = None if attitude is None or not flight.is_copter else attitude.between(0.0, ends)
+    if stands is None or not sensors or min(map(len, (stands, *sensors))) < gravity.FEWEST:
+        return
+    tilt = max(abs(float(median(stands[angle]))) for angle in ("Roll", "Pitch"))
+    leans = [gravity.lean_deg(np.array([median(table[axis]) for axis in gravity.AXES])) for table in sensors]
+    if tilt < gravity.UPRIGHT_DEG and min(leans) > 180.0 - gravity.UPRIGHT_DEG:
+        failed = flight.lost_control_s is not None or flight.impact_s is not None
+        yield Finding(
+            kind="imu",
+            title="the accelerometers feel gravity upside down",
+            onset_s=0.0,
+            end_s=flight.end_s,
+            severity="critical" if failed else "warning",
+            evidence=(
+                f"gravity pulls {min(leans):.0f} degrees off the bottom of the board before take-off, where by the "
+                f"attitude it leans {tilt:.0f} degrees"
+            ),
+            source="IMU.AccX, AccY, AccZ and ATT before take-off",
+            probability=_UPSIDE_DOWN_P,
         )
 
 
