@@ -26,7 +26,7 @@ from care_core.ecosystems.findings import (
     FindingKind,
     every_finding,
 )
-from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
+from care_core.ecosystems.ranking import GRAVITY, LIKELY, SYMPTOMS
 from care_core.ecosystems.vehicles import flies, is_simulated, vehicle_of, vehicle_of_run
 from care_core.ecosystems.way_back import way_back
 from care_core.logs.formats import MAVLINK_TLOG, format_named
@@ -127,8 +127,10 @@ def _mended(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str:
 
 
 def _of_the_gravest(findings: Iterable[Finding], run: Run) -> str:
-    """What to do about the first critical finding, where nothing is likely enough to be named as the cause."""
-    gravest = next((one for one in findings if one.severity == "critical" and not one.after_impact), None)
+    """What to do about the first critical finding, or warning, where nothing is likely enough to be named as the
+    cause."""
+    told = [one for one in findings if one.severity != "info" and not one.after_impact]
+    gravest = next(iter(sorted(told, key=lambda one: GRAVITY[one.severity])), None)
     return "" if gravest is None else remedy(gravest, is_robot=_is_robot(run))
 
 

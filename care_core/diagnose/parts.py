@@ -13,9 +13,9 @@ from care_core.diagnose.remedies import CHARGE
 from care_core.ecosystems.findings import (
     BY_STICK,
     CAME_DOWN,
-    NO_BATTERY,
     NO_MISSION,
     NOT_BEGUN,
+    OF_MONITOR,
     OWN_SUPPLY,
     UNCHARGED,
     UNPOWERED,
@@ -106,7 +106,7 @@ def _stops(finding: Finding) -> bool:
 
 def is_pack(part: Finding) -> bool:
     """Whether a part that failed is the battery itself, which is charged or replaced."""
-    return part.kind in ("battery", "prearm") and not part.title.startswith((OWN_SUPPLY, NO_BATTERY))
+    return part.kind in ("battery", "prearm") and not part.title.startswith((OWN_SUPPLY, *OF_MONITOR))
 
 
 def unmended(part: Finding, then: str = "") -> str:

@@ -12,10 +12,10 @@ from collections.abc import Mapping
 
 from care_core.ecosystems.findings import (
     CAME_DOWN,
-    NO_BATTERY,
     NO_MISSION,
     NO_POSITION_FOR,
     NOT_BEGUN,
+    OF_MONITOR,
     OWN_SUPPLY,
     UNPOWERED,
     Finding,
@@ -57,6 +57,7 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         "the gyro is offset",
         "let it stand still while it starts, so that it calibrates its gyros; replace it if they still turn at rest",
     ),
+    ("the accelerometers feel gravity upside down", "see that AHRS_ORIENTATION says how the board is mounted"),
     ("the accelerometers do not feel gravity", "calibrate the accelerometers, and replace the autopilot if that fails"),
     (
         r"only \d+ satellites|poor satellite geometry",
@@ -100,7 +101,7 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         f"(.*){NO_POSITION_FOR}",
         r"give it a source of position (GPS, optical flow, a camera), and wait for it before \1; Altitude needs none",
     ),
-    (re.escape(NO_BATTERY), "check the power module's cable and BATT_MONITOR"),
+    ("|".join(OF_MONITOR), "check the power module's cable and BATT_MONITOR"),
     # --- robots
     ("the laser falls silent|the laser drops out", "check the laser's cable and supply, and its driver's log"),
     (

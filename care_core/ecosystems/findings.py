@@ -156,6 +156,9 @@ NOT_READY = "not ready to fly: "
 """Begins the title of a refusal of PX4; the words of its last check follow."""
 NO_BATTERY = "the battery monitor measures no battery"
 """Begins the title of its failsafe, which follows."""
+MONITOR_SILENT = "the battery monitor fell silent"
+OF_MONITOR = NO_BATTERY, MONITOR_SILENT
+"""What titles begin with that speak of the monitor of a battery, and of no pack."""
 CAME_DOWN = "it came down and could not rise again"
 
 

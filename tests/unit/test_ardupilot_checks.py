@@ -16,7 +16,7 @@ from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import expanded
-from care_core.ecosystems.findings import DROPPED, NO_BATTERY, Finding, every_finding
+from care_core.ecosystems.findings import DROPPED, MONITOR_SILENT, NO_BATTERY, UNCHARGED, Finding, every_finding
 from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.ecosystems.spans import runs
 from care_core.logs.base import Table
@@ -604,6 +604,19 @@ def test_a_failsafe_of_a_monitor_that_measures_nothing_blames_no_threshold() -> 
     assert first(made).title == f"{NO_BATTERY}, and its failsafe acted"
 
 
+def test_a_monitor_that_fell_silent_is_no_empty_battery() -> None:
+    made = Made()
+    made.rows["MSG"].append((ARMED_S - 2.0, {"Message": "Battery 1 is missing, last: 15.60V used 0 mAh"}))
+    made.table["BAT"]["Volt"] -= float(made.table["BAT"]["Volt"][0]) - 3 * 3.88
+    finding = first(made)
+    assert (finding.title, finding.severity) == (MONITOR_SILENT, "warning")
+    made.rows["MSG"].append((ARMED_S - 1.0, {"Message": "Battery Failsafe - Disarming"}))
+    finding = first(made)
+    assert (finding.title, finding.severity) == (MONITOR_SILENT, "critical")
+    assert not is_pack(finding)
+    assert UNCHARGED not in {one.title for one in finding.below}
+
+
 def test_of_a_battery_that_was_not_full_it_is_none() -> None:
     made = Made()
     made.settings["BATT_LOW_VOLT"] = 11.9
@@ -713,6 +726,9 @@ def test_a_radio_that_comes_back_at_once_explains_little() -> None:
     made.rows["ERR"] = [(50.0, {"Subsys": 5.0, "ECode": 1.0}), (50.2, {"Subsys": 5.0, "ECode": 0.0})]
     assert (first(made).kind, first(made).severity) == ("radio", "warning")
     made.rows["ERR"][1] = (80.0, {"Subsys": 5.0, "ECode": 0.0})
+    assert first(made).severity == "critical"
+    made.rows["ERR"][1] = (50.2, {"Subsys": 5.0, "ECode": 0.0})
+    made.rows["MODE"] = [(0.0, {"ModeNum": 5.0, "Rsn": 1.0}), (50.1, {"ModeNum": 6.0, "Rsn": 3.0})]  # it acted: what it broke off it did
     assert first(made).severity == "critical"
 
 
@@ -1022,6 +1038,16 @@ def test_accelerometers_that_do_not_feel_gravity_at_rest_are_told(felt: float, i
         made.table[name]["AccZ"] += 9.8 - felt
     titles = [one.title for one in every_finding(made.find())]
     assert ("the accelerometers do not feel gravity at rest" in titles) == is_told
+
+
+@pytest.mark.parametrize(("roll_deg", "is_told"), [(0.0, True), (180.0, False)])
+def test_gravity_that_is_felt_upside_down_is_told_unless_the_vehicle_hangs_so(roll_deg: float, is_told: bool) -> None:
+    made = Made()
+    for name in ("IMU", "IMU#2"):
+        made.table[name]["AccZ"] *= -1
+    made.table["ATT"]["Roll"] += roll_deg
+    titles = [one.title for one in every_finding(made.find())]
+    assert ("the accelerometers feel gravity upside down" in titles) == is_told
 
 
 def test_gyros_that_turn_fast_differ_by_their_scale_and_are_not_noisy() -> None:

@@ -61,6 +61,12 @@ def test_messages_and_checks_tell_of_an_upset_as_well() -> None:
     )
 
 
+def test_a_run_that_failed_with_a_warning_alone_is_sent_after_what_that_calls_for() -> None:
+    lost = Finding("radio", "the ground station link was lost", 31.8, 32.5, "warning", "", "", "world", 0.3)
+    told = replace(failed(lost), tell_more=(), hypotheses=(Hypothesis("chance", "", 0.7),))
+    assert next_step(told, has_failed=True).startswith("check the link's antennas and range")
+
+
 def test_what_was_not_upset_runs_again() -> None:
     assert next_step(failed(LATE), has_failed=True) == AGAIN
     assert "run again" in next_step(failed(LATE, fixed=True), has_failed=True)

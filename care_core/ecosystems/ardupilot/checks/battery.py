@@ -7,6 +7,7 @@ The board needs 4.3 V at least (ArduPilot, Power module and brown-outs: Vcc 5 V,
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,13 +18,24 @@ from care_core.ecosystems.ardupilot.checks.settings import supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import BATTERY_FAILSAFE, NO_BATTERY, OWN_SUPPLY, SAGS, UNCHARGED, Finding, Severity
+from care_core.ecosystems.findings import (
+    BATTERY_FAILSAFE,
+    MONITOR_SILENT,
+    NO_BATTERY,
+    OWN_SUPPLY,
+    SAGS,
+    UNCHARGED,
+    Finding,
+    Severity,
+)
 from care_core.ecosystems.lithium import CHARGED_V, CRITICAL_V, FULL_V, HARMED_V, LOW_V, NOT_FULL_V
 from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, known_median, median
 from care_core.text import log_time
 
+_MISSING = re.compile(r"Battery (?P<number>\d+) is missing", re.IGNORECASE)
+_ACTED = re.compile(r"Battery Failsafe", re.IGNORECASE)
 READS: Wanted = {"BAT": ("Volt", "Curr"), "POWR": ("Vcc",)}
 
 LIMITS = Limits()
@@ -58,6 +70,7 @@ _DEEP_P = LIMITS.add("probability of a pack that sags deep", 0.4, "", "a choice:
 _SAGS_P = LIMITS.add("probability of a pack that sags", 0.25, "", "a choice: most packs do at the end of a flight")
 _FAILSAFE_P = LIMITS.add("probability of a bad pack, failsafe alone", 0.1, "", "a choice: mostly a flight too long")
 _NOTHING_P = LIMITS.add("probability of a monitor that measures nothing", 0.95, "", "the vehicle flew on")
+_SILENT_P = LIMITS.add("probability of a monitor that fell silent", 0.95, "", "the firmware's own word")
 _MONITOR_P = LIMITS.add("probability of a monitor not calibrated", 0.3, "", "a choice: it harms failsafes only")
 _BOARD_P = LIMITS.add("probability of a weak board supply", 0.7, "", "a choice: below 4.3 V the board may restart")
 
@@ -72,6 +85,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             yield from _pack(flight, battery, alive)
     if not flight.batteries:
         yield from filter(None, (_of_no_battery(flight, one) for one in flight.all("BAT", "Volt")[:1]))
+    yield from _silent(flight)
     yield from _board(flight)
 
 
@@ -183,6 +197,25 @@ def _of_no_battery(flight: Flight, table: Table) -> Finding | None:
         source="BAT.Volt; battery failsafe",
         probability=_NOTHING_P,
     )
+
+
+def _silent(flight: Flight) -> Iterator[Finding]:
+    """A monitor of which the firmware got no readings for so long that it takes the battery for missing, and acts as on
+    one that is empty (AP_BattMonitor_Backend::update_failsafes); before arming as well, for that stays on."""
+    for t, text in flight.whole.messages:
+        if (match := _MISSING.match(text)) is not None and t <= flight.end_s:
+            failsafe = next((at for at, said in flight.whole.messages if at >= t and _ACTED.match(said)), None)
+            yield Finding(
+                kind="battery",
+                title=MONITOR_SILENT,
+                onset_s=t,
+                end_s=t,
+                severity="warning" if failsafe is None else "critical",
+                evidence=f"the firmware says '{text}': no pack is empty for that{_and_failsafe(failsafe)}",
+                source=f"MSG: Battery {match['number']} is missing",
+                probability=_SILENT_P,
+            )
+            return
 
 
 def _acted(flight: Flight, failsafe: float) -> bool:

@@ -16,6 +16,8 @@ READS: Wanted = {}
 
 _LINKS = {RADIO_FAILSAFE: "the radio link was lost", GCS_FAILSAFE: "the ground station link was lost"}
 _WORDS = {RADIO_FAILSAFE: ("radio failsafe", "throttle failsafe"), GCS_FAILSAFE: ("gcs failsafe",)}
+_REASONS = {RADIO_FAILSAFE: 3, GCS_FAILSAFE: 5}
+"""Why a mode was entered (ModeReason.h)."""
 LIMITS = Limits()
 _BRIEF_S = LIMITS.add(
     "loss that explains no crash", 1.0, "s", "a choice: a failsafe that is over so soon has moved nothing far"
@@ -25,7 +27,8 @@ _BRIEF_P = LIMITS.add("probability of a brief loss", 0.3, "", "a choice: links d
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """Each link with how long it was gone; one that came back within a second does not explain a crash."""
+    """Each link with how long it was gone; one that came back within a second, before its failsafe did anything, does
+    not explain a crash."""
     for subsystem, title in _LINKS.items():
         told = flight.errors(subsystem)
         gone = [t for t, code in told if code > 0]
@@ -37,7 +40,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         back = [t for t, code in told if code == 0 and t > gone[0]]
         end = back[0] if back else flight.watched[-1][1]
         away = end - gone[0]
-        severity: Severity = "warning" if away < _BRIEF_S or subsystem == GCS_FAILSAFE else "critical"
+        is_brief = away < _BRIEF_S and not _acted(flight, subsystem, gone[0])
+        severity: Severity = "warning" if is_brief or subsystem == GCS_FAILSAFE else "critical"
         if not flight.armed:
             severity = "info"  # a transmitter that is switched off on the ground
         yield Finding(
@@ -49,8 +53,13 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence=f"failsafe at {log_time(gone[0])}, " + (f"back after {away:.1f} s" if back else "not back"),
             source=f"ERR {subsystem}",
             suspect="world",
-            probability=_BRIEF_P if away < _BRIEF_S else _LOST_P,
+            probability=_BRIEF_P if is_brief else _LOST_P,
         )
+
+
+def _acted(flight: Flight, subsystem: int, since_s: float) -> bool:
+    """Whether the failsafe changed the mode: what it broke off it did, however soon the link was back."""
+    return any(m.reason == _REASONS[subsystem] and 0 <= m.start_s - since_s < _BRIEF_S for m in flight.modes)
 
 
 CHECK = Check("radio", "a lost radio or ground station link", READS, LIMITS, find)
