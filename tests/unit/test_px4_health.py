@@ -395,6 +395,8 @@ def test_a_battery_that_runs_down_in_the_air_is_told_and_one_with_fewer_cells_th
     assert flown(16.4, 13.2, 3) == [("the battery ran down to its emergency level", "warning")]
     assert flown(16.4, 10.0, 3) == [("the battery ran down to its emergency level", "critical")]
     assert flown(11.6, 9.9, 3) == [("the battery has fewer cells than are set", "warning")]
+    assert flown(25.0, 24.0, 0) == [("the battery has more cells than are set", "warning")]
+    assert flown(17.4, 16.8, 0) == []  # cells of high voltage are full at 4.35 V
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
 """A battery that was not charged, one whose voltage falls under load as no sound one's does, one that ran down, one
-that was told to be empty and was not, and one that has fewer cells than are set."""
+that was told to be empty and was not, and one that has fewer or more cells than are set."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import UNCHARGED, Finding
-from care_core.ecosystems.lithium import HARMED_V, HIGHEST_V, LOW_V
+from care_core.ecosystems.lithium import HARMED_V, HIGHEST_V, LOW_V, NO_CELL_V
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles.settings import code
@@ -53,14 +53,15 @@ _CRITICAL, _EMERGENCY = 2, 3
 """battery_status.warning."""
 _EMPTY_AT = ("BAT1_V_EMPTY", "BAT_V_EMPTY")
 _CELLS_SET = ("BAT1_N_CELLS", "BAT_N_CELLS")
-_FEWEST = 3
+_FEWEST, _MOST = 3, 17
+"""Records that tell of rest, and one cell more than BAT1_N_CELLS may be."""
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     table = flight.table(_TOPIC, "voltage_v", "current_a", "remaining")
     if table is None:
         return
-    wrong = next(iter((*_fewer_cells(flight, table), *_told_low(flight))), None)
+    wrong = next(iter((*_other_cells(flight, table), *_told_low(flight))), None)
     yield from (wrong,) if wrong is not None else _ran_down(flight)
     if not flight.arming:
         return
@@ -79,32 +80,40 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         yield from _worn(before, loaded, code(flight.log.settings(), "BAT1_N_CELLS") or 0, (armed_s, end_s))
 
 
-def _fewer_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
-    """By its voltage at rest, which no pack of so many cells has that is still flown."""
+def _other_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
+    """By its voltage at rest, which no pack of so many cells has that is still flown, or none at all."""
     name, cells = _cells_set(flight)
     rest = _at_rest(table)
     if not cells or len(rest) < _FEWEST:
         return
     volts = float(median(rest["voltage_v"]))
-    fits = [n for n in range(1, cells) if _PER_CELL[0] <= volts / n <= _PER_CELL[1]]
-    if volts / cells >= _SHORT_V or len(fits) != 1:
+    fits = [n for n in range(1, _MOST) if _PER_CELL[0] <= volts / n <= _PER_CELL[1]]
+    fewer, more = [n for n in fits if n < cells], [n for n in fits if n > cells]
+    if volts / cells < _SHORT_V and len(fewer) == 1:
+        has, wanted = f"{volts / fewer[0]:.1f} V for each of {fewer[0]}; levels, charge and", fewer[0]
+    elif volts / cells > NO_CELL_V and more:
+        has, wanted = (
+            f"more than any has, {volts / more[0]:.1f} V for each of {more[0]}; it never looks low, and",
+            more[0],
+        )
+    else:
         return
     yield Finding(
         kind="battery",
-        title="the battery has fewer cells than are set",
+        title=f"the battery has {'fewer' if wanted < cells else 'more'} cells than are set",
         onset_s=float(rest.t[0]),
         end_s=float(rest.t[-1]),
         severity="warning",
         evidence=(
             f"{volts:.1f} V at rest: {volts / cells:.1f} V for each of the {cells} cells that {name} tells, "
-            f"{volts / fits[0]:.1f} V for each of {fits[0]}; levels, charge and failsafes are wrong with it"
+            f"{has} failsafes are wrong with it"
         ),
         source=f"{_TOPIC}.voltage_v; {name}",
         suspect="parameter",
         probability=_CELLS_P,
         mission_lost=_CELLS_LOSE_P,
         parameters=(name,),
-        wanted=((name, float(fits[0])),),
+        wanted=((name, float(wanted)),) if wanted < cells or len(more) == 1 else (),
     )
 
 
@@ -228,7 +237,7 @@ def _worn(before: Table, loaded: Table, cells: int, span: Span) -> Iterator[Find
 
 CHECK = Check(
     "battery",
-    "a battery that was not charged, sags under load, ran down, was told empty or has fewer cells than are set",
+    "a battery that was not charged, sags under load, ran down, was told empty or has other cells than are set",
     READS,
     LIMITS,
     find,
