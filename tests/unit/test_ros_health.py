@@ -560,6 +560,18 @@ def test_a_laser_that_pauses_again_and_again_while_the_odometry_goes_on_drops_ou
     assert not [one for one in looked_at(Pausing("link"), tmp_path).findings if "drops out" in one.title]
 
 
+def test_a_laser_that_never_saw_anything_is_noted(tmp_path: Path) -> None:
+    class Empty(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                if name == SCAN:
+                    message.ranges = np.full(len(message.ranges), np.inf, np.float32)
+                yield topic, name, time_s, message
+
+    (finding,) = looked_at(Empty(), tmp_path).findings
+    assert (finding.title, finding.severity) == ("the laser saw nothing in any scan", "info")
+
+
 class Repeating(Drive):
     """Its drivers send faster than their data are new: each message of odometry and laser goes out three times."""
 

@@ -16,6 +16,7 @@ from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS
 from care_core.ecosystems.ros.sensors import Scans
 from care_core.ecosystems.spans import stretches, unbroken
 from care_core.numbers import Floats, median, quantile
+from care_core.records import replace
 from care_core.text import shortened
 
 LIMITS = Limits()
@@ -205,6 +206,8 @@ def _medians(rows: Floats) -> Floats:
 
 def _blind(drive: Drive, scans: Scans) -> Iterator[Finding]:
     seen = np.isfinite(scans.ranges).mean(axis=1)
+    if not seen.any() and len(seen) >= SCANS and _moved(drive, float(scans.t[0]), float(scans.t[-1])):
+        yield _sees_nothing_ever(drive, scans)
     if float(median(seen[: max(5, len(seen) // 10)])) < SEEING:
         return
     for start, end in stretches(scans.t, seen <= BLIND, BREAK_PERIODS * _period(scans)):
@@ -212,6 +215,13 @@ def _blind(drive: Drive, scans: Scans) -> Iterator[Finding]:
             evidence = f"{median(seen):.0%} of its rays return usually, at most {BLIND:.0%} for {end - start:.0f} s"
             yield _finding(drive, "the laser sees nothing", (start, end), evidence, scans.topic, 0.7)
             return
+
+
+def _sees_nothing_ever(drive: Drive, scans: Scans) -> Finding:
+    """A note: an empty world sends nothing back either."""
+    span = float(scans.t[0]), float(scans.t[-1])
+    evidence = f"no ray of any of its {len(scans.t)} scans came back: it stands in the open, or sees nothing"
+    return replace(_finding(drive, "the laser saw nothing in any scan", span, evidence, scans.topic), severity="info")
 
 
 def _period(scans: Scans) -> float:
