@@ -728,7 +728,7 @@ def test_a_radio_that_comes_back_at_once_explains_little() -> None:
     made.rows["ERR"][1] = (80.0, {"Subsys": 5.0, "ECode": 0.0})
     assert first(made).severity == "critical"
     made.rows["ERR"][1] = (50.2, {"Subsys": 5.0, "ECode": 0.0})
-    made.rows["MODE"] = [(0.0, {"ModeNum": 5.0, "Rsn": 1.0}), (50.1, {"ModeNum": 6.0, "Rsn": 3.0})]  # it acted: what it broke off it did
+    made.rows["MODE"] = [(0.0, {"ModeNum": 5.0, "Rsn": 1.0}), (50.1, {"ModeNum": 6.0, "Rsn": 3.0})]  # it acted
     assert first(made).severity == "critical"
 
 
