@@ -36,6 +36,8 @@ NO_LIMIT = "no limit of this mission is known"
 _CLAUSE = re.compile(r"\s*[,;(]")
 """What ends the first clause of a reason."""
 NO_LIMITS = "no limits for time and energy, no causes by parameters"
+FEW = 2
+"""Objectives that are named with the reason why they could not be judged."""
 MOST_FINDINGS = 2
 """Findings that the sentence names."""
 AS_WELL = 0.1
@@ -359,13 +361,7 @@ def _failed(
     if fit == "no" and len(unknown) == len(objectives):
         return why_unjudged(findings)
     if unknown:
-        reasons = [one.reason for one in unknown if one.reason]
-        reason = next(iter(reasons), "")
-        if len(unknown) == len(objectives) and len({_CLAUSE.split(one)[0] for one in reasons}) == 1:
-            return reason
-        names = ", ".join(one.name for one in unknown)
-        # The reason first: of a long list of names a narrow line shows the beginning alone.
-        return f"{reason}{'; ' if reason else ''}{names} could not be evaluated, no fault was found{where}"
+        return _unjudged(unknown, f"no fault was found{where}", is_all=len(unknown) == len(objectives))
     if status == "not_evaluated" and fit == "no":
         met = listed([one.name for one in objectives if one.status == "ok"])
         return f"{met} are OK; no profile fits, so nothing else was judged"
@@ -373,6 +369,26 @@ def _failed(
         return "nothing could be judged"
     part = next(filter(_is_broken_part, findings), None)
     return "all objectives are within their thresholds" if part is None else f"{BUT}{_with_time(part)}"
+
+
+def _unjudged(unknown: Sequence[JudgedObjective], found: str, *, is_all: bool) -> str:
+    """Why objectives could not be judged, by their reasons; whose a reason is goes without saying where it is that of
+    many."""
+    named: dict[str, list[JudgedObjective]] = {}
+    for one in unknown:
+        named.setdefault(_CLAUSE.split(one.reason or "")[0], []).append(one)
+    if is_all and len(named) == 1 and unknown[0].reason:
+        return unknown[0].reason
+    room = LINES * LINE - len(f"{STATUS_WORDS['not_evaluated']}: ; {found}") - _BROKEN
+    return "; ".join((*_in_lines([_unjudged_for(group) for group in named.values()], room), found))
+
+
+def _unjudged_for(alike: Sequence[JudgedObjective]) -> str:
+    """What kept objectives from being judged that share the first clause of their reasons."""
+    told, reason = ", ".join(one.name for one in alike).replace("_", " "), alike[0].reason
+    if not reason:
+        return f"{told} could not be evaluated"
+    return reason if len(alike) > FEW else f"{told}: {reason}"
 
 
 _CAME_DOWN = ("control was lost at ", "it hit the ground at ")

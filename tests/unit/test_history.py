@@ -179,7 +179,7 @@ NAMED = {
         (["ok", "ok"], {}, "OK: all objectives are within their thresholds"),
         (["ok", "ok"], {"findings": [NAMED]}, "FAULT: it hit the \\x1bground at 9.0 s"),
         (["ok", "fault"], {"findings": [NAMED]}, "FAULT: o1 not met"),
-        (["ok", "not_evaluated"], {}, "NOT EVALUATED: o1 could not be evaluated, no fault was found"),
+        (["ok", "not_evaluated"], {}, "NOT EVALUATED: o1 could not be evaluated; no fault was found"),
         ([], {}, "NOT EVALUATED: nothing could be judged"),
         (["not_evaluated"], {"fit": {"verdict": "no", "reasons": []}}, "NOT EVALUATED: no limit of this mission"),
         (["ok"], {"findings": [{**NAMED, "severity": "info"}]}, "OK: all objectives are within their thresholds"),

@@ -214,8 +214,22 @@ def test_one_reason_for_all_that_could_not_be_judged_is_the_first_line() -> None
     why = "the vehicle never armed, and nobody asked it to; it would refuse: RC not found"
     never = [unknown(why), unknown("the vehicle never armed (see why arming was refused)")]
     assert verdict_on(never).headline == f"NOT EVALUATED: {why}"
-    for several in ([*never, unknown("no BAT in the log")], [*never, MET]):
-        assert verdict_on(several).headline.endswith("could not be evaluated, no fault was found")
+    assert verdict_on([*never, MET]).headline == f"NOT EVALUATED: success, success: {why}; no fault was found"
+
+
+def test_whose_a_reason_is_is_told_where_it_is_not_that_of_many() -> None:
+    def unknown(name: str, reason: str) -> ObjectiveResult:
+        return ObjectiveResult(replace(SUCCESS, name=name), None, SUCCESS.threshold, "not_evaluated", reason)
+
+    none = [unknown(name, "no mission was flown") for name in ("mission_success", "mission_time", "energy")]
+    grounded = unknown("took_off", "it never left the ground")
+    told = "NOT EVALUATED: no mission was flown; took off: it never left the ground; no fault was found"
+    assert verdict_on([*none, grounded, MET]).headline == told
+    assert verdict_on([unknown("energy", ""), MET]).headline == (
+        "NOT EVALUATED: energy could not be evaluated; no fault was found"
+    )
+    long = [unknown(f"o{n}", f"the topic that tells of number {n} is not in this log") for n in range(9)]
+    assert len(wrapped(verdict_on(long).headline)) <= 2
 
 
 def test_the_fit_comes_last_in_two_lines_at_most_and_names_no_profile_that_does_not_matter() -> None:
