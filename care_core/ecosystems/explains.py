@@ -41,7 +41,9 @@ EXPLAINS: Explains = {
     # --- robots that drive by their sensors
     "laser": frozenset(("laser", "localisation", "planner", "blocked", "control", "tf", "software")),
     "localisation": frozenset(("localisation", "planner", "blocked", "control", "tf")),
-    "drive": frozenset(("drive", "planner", "control")),
+    "drive": frozenset(  # what moves while it is disarmed aligns no estimator, and none of its sensors agree
+        ("drive", "planner", "control", "estimator", "compass", "prearm")
+    ),
     "commands": frozenset(("drive", "planner", "control")),
     "tf": frozenset(("tf", "planner", "control")),
     "topics": frozenset(("tf", "planner", "control")),  # no topic ends another: a node ends several
@@ -72,6 +74,7 @@ _WORDS: Mapping[FindingKind, str] = {
     "imu": f"imu|ins|gyro|accel|attitude|roll|{_ESTIMATED}",
     "airspeed": "airspeed|pitot",
     "battery": "batt|volt|power",
+    "drive": f"gps|compass|gyro|accel|mag|yaw|{_ESTIMATED}",
     "estimator": f"gps|compass|yaw|attitude|estimat|{_ESTIMATED}",
 }
 REFUSES = {kind: re.compile(rf"\b({words})", re.IGNORECASE) for kind, words in _WORDS.items()}

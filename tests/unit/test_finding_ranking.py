@@ -157,3 +157,16 @@ def test_a_battery_makes_no_inertial_sensor_wrong_and_a_monitor_loads_no_process
         assert len(rank_findings([battery, finding(kind, 5.0, "warning")])) == 2
     supply = replace(finding("battery", 1.0), title=f"{OWN_SUPPLY} dips")
     assert len(rank_findings([supply, finding("attitude", 3.0), finding("imu", 5.0, "warning")])) == 1
+
+
+def test_what_drives_while_it_is_disarmed_aligns_no_compass_and_is_refused() -> None:
+    drives = replace(finding("drive", 0.0), suspect="parameter", parameters=("SERVO3_TRIM",))
+    drives = replace(drives, probability=0.95, end_s=100.0)
+    compass = replace(finding("compass", 1.9), probability=0.9)
+    refused = [
+        replace(finding("prearm", 80.0), title=f"arming was refused: {why}", suspect="parameter")
+        for why in ("AHRS: DCM Roll/Pitch inconsistent", "RC not found")
+    ]
+    told = rank_findings([compass, *refused, drives])
+    assert [one.kind for one in told[0].consequences] == ["compass", "prearm"]
+    assert [one.title for one in told[1:]] == ["arming was refused: RC not found"]

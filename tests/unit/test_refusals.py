@@ -110,8 +110,11 @@ def refused(*texts: str, **settings: Off) -> Finding:
     return refused_at(12.6, texts, settings)
 
 
-def refused_at(volts: float, texts: Sequence[str], settings: Mapping[str, Off]) -> Finding:
+def refused_at(
+    volts: float, texts: Sequence[str], settings: Mapping[str, Off], *, has_receiver: bool = True
+) -> Finding:
     made = Made()
+    made.table["GPS"]["Status"] *= has_receiver
     del made.rows["ARM"]
     made.table["CTUN"]["ThO"][:] = 0.0
     made.table["BAT"]["Volt"][:] = volts + made.noise(0.01)
@@ -218,6 +221,16 @@ def test_where_surroundings_may_be_the_reason_a_parameter_is_less_sure() -> None
     )
     assert alone.parameters == outside.parameters == ("GPS_TYPE2",)
     assert outside.probability < alone.probability < 0.9
+
+
+@pytest.mark.parametrize(("has_receiver", "named"), [(True, ("EK3_VELNE_M_NSE",)), (False, ("GPS_TYPE",))])
+def test_a_receiver_that_never_answers_is_the_reason_and_its_operator_knows_why(
+    has_receiver: bool, named: tuple[str, ...]
+) -> None:
+    off = {"GPS_TYPE": (6.0, 1.0), "EK3_VELNE_M_NSE": (0.14, 0.5)}
+    finding = refused_at(12.6, ("AHRS: waiting for home",), off, has_receiver=has_receiver)
+    assert finding.parameters == named
+    assert "GPS_TYPE" not in dict(finding.wanted)
 
 
 def test_what_is_only_a_little_off_is_not_blamed() -> None:

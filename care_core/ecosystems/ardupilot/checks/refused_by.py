@@ -47,6 +47,9 @@ _FAR = LIMITS.add(
 _CODES = LIMITS.add("greatest default of a code", 10.0, "", "a choice: another code is another choice, however near")
 _FULL_AT = LIMITS.add("cell that reads full", CHARGED_V, "V", "voltages of lithium polymer cells")
 _NONE_AT = LIMITS.add("cell that no pack has", HARMED_V, "V", "voltages of lithium polymer cells")
+_RECEIVER = re.compile(r"GPS\d?_TYPE\d?")
+_ANSWERS = 1
+"""GPS.Status of a receiver without a fix; below it none is there."""
 _SAME = 1e-6
 """Vehicles hold parameters in 32 bits."""
 
@@ -134,9 +137,22 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
             yield _refusing(one, sure, _asks(one, broken, values), is_shown=True, only=only)
     elif proven := _at_fault(named):
         yield from (_refusing(one, PROVEN, is_shown=True) for one in proven)
+    elif (unanswered := [one for one in held if one.is_off and _RECEIVER.fullmatch(one.name)]) and _is_without(flight):
+        yield from (_unanswered(one) for one in unanswered)
     else:
         sure = OFF * OUTSIDE if is_outside else OFF
         yield from (_refusing(one, sure) for one in held if one.is_far_off)
+
+
+def _is_without(flight: Flight) -> bool:
+    """Whether no receiver ever told of a satellite."""
+    return not any((table["Status"] >= _ANSWERS).any() for table in flight.all("GPS", "Status"))
+
+
+def _unanswered(one: _Held) -> Refusing:
+    """A kind of receiver that was set and that never answered: it, or the receiver; which its operator knows."""
+    words = f"{one.name} is {one.value:g} (default {one.default:g}), and no receiver answers: check it and its cable"
+    return Refusing(one.name, words, None, PLAUSIBLE, is_shown=True)
 
 
 def _at_fault(held: Sequence[_Held]) -> list[_Held]:
