@@ -10,6 +10,8 @@ import pytest
 
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
 from care_core.ecosystems.px4 import missions  # noqa: F401  it registers the kind of mission
+from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.px4.measures import energy, outcome, requested, route, signals  # noqa: F401  theirs
 from care_core.ecosystems.px4.measures.flown import flown_mission
 from care_core.logs import formats
@@ -227,3 +229,13 @@ def test_a_mission_in_force_that_does_not_go_on_has_failed(end_s: float, has_leg
     (found,) = kind.missions(model, cut, {})
     assert value("px4_mission_success", found) == 0.0 if clause else not is_known(value("px4_mission_success", found))
     assert [one for one in kind.shortfall(found) if one in clause] == ([clause] if clause else [])
+
+
+def test_a_mission_before_any_mode_is_known_has_no_outcome() -> None:
+    status = flown()["vehicle_status"]
+    late = Table(status.t + 200.0, status.columns)
+    model, _ = read(flown(vehicle_status=late), 400.0, formats.PX4_ULG, {"stack": "PX4", "firmware": "PX4 v1.15.0"})
+    assert isinstance(model, Px4Flight)
+    told = mission_outcome(model, (5.0, 132.0))
+    assert isinstance(told, Unavailable)
+    assert told.reason == "the mission was not flown to its end"

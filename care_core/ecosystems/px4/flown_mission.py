@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -34,8 +35,9 @@ def mission_outcome(flight: Px4Flight, span: Span) -> Value:
         return Unavailable(reason, "judge a run whose mission stays as it was uploaded")
     if any(flight.ever(RESULT, "finished", 1, part) for part in flown) or did_last_item(flight, span):
         return 1.0
-    mode = mode_name("px4", flight.modes_during(span)[-1])
-    return Unavailable(f"the mission was not flown to its end, the last mode was {mode}")
+    modes = flight.modes_during(span)
+    last = f", the last mode was {mode_name('px4', modes[-1])}" if modes else ""
+    return Unavailable(f"the mission was not flown to its end{last}")
 
 
 def _replaced(flight: Px4Flight, flown: Sequence[Span]) -> float | None:
@@ -69,10 +71,9 @@ def uploads(flight: Px4Flight) -> Iterator[tuple[float, int | None]]:
 
 def _flown(flight: Px4Flight, span: Span) -> Iterator[Span]:
     """The parts of a span in the mode that flies missions, with what is published a moment after."""
-    starts = [(t, mode) for t, mode in flight.modes if t <= span[1]]
-    ends = [t for t, _ in starts[1:]] + [span[1]]
-    for (start, mode), end in zip(starts, ends, strict=True):
-        if way_of("px4", mode) == "mission" and end > span[0]:
+    entered = [(t, mode) for t, mode in flight.modes if t <= span[1]]
+    for (start, mode), (end, _) in pairwise((*entered, (span[1], None))):
+        if mode is not None and way_of("px4", mode) == "mission" and end > span[0]:
             yield max(start, span[0]), end + SAID_WITHIN_S
 
 

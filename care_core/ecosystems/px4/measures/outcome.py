@@ -109,8 +109,8 @@ def _flown_whole(mission: Mission) -> Value:
         return Unavailable("the log does not say which items were reached", f"record {RESULT}", RESULT)
     if not flown.all_reached:
         flight, span = flight_of(mission), (mission.start_s, mission.end_s)
-        last = flight.modes_during(span)[-1]
-        if way_of("px4", last) == "manual":  # what somebody broke off did not fail
+        last = next(reversed(flight.modes_during(span)), None)
+        if last is not None and way_of("px4", last) == "manual":  # what somebody broke off did not fail
             return Unavailable(f"the mission was not flown to its end, the last mode was {mode_name('px4', last)}")
         return mission_outcome(flight, span) if flown.items is None else 0.0
     off_m = landing_error(mission, {})
