@@ -13,6 +13,7 @@ import numpy as np
 
 from care_core.ecosystems.dictionary import Dictionary, Message, find_message, instance_field
 from care_core.logs.base import Table
+from care_core.logs.clock import PACE
 from care_core.numbers import Bools, Floats, distinct, median
 from care_core.text import log_time
 
@@ -21,8 +22,8 @@ STAMP = "header.stamp"
 
 ANY_FASTEST_HZ = 2_000.0
 """Of a message without an entry: robots publish odometry and lasers at up to some 100 Hz, joints at 1 kHz."""
-_PACE, _GPS_STEP_S = 1.2, 60.0
-"""How far the log's clock may run from the satellites': in 24 logs of four firmwares they agree to 0.3 %."""
+_GPS_STEP_S = 60.0
+"""A longer step of the satellites' time is of a new week, or of a receiver that found it."""
 _SET_S = 5.0
 """A step of a clock by less costs no mission its time; most recorders stall for less."""
 APART, _STAMPED_S, _QUARTERS, _MOSTLY = 1.25, 10.0, 4, 0.9
@@ -89,7 +90,7 @@ def clock_doubt(dictionary: Dictionary, tables: Mapping[str, Table], start_s: fl
     if why := _was_set(dictionary, tables, start_s, end_s):
         return why
     pace = _satellites_pace(dictionary, tables.get("GPS"), start_s, end_s)
-    if not 1 / _PACE < pace < _PACE:
+    if not 1 / PACE < pace < PACE:
         return f"the log's clock goes wrong: by the satellites' time {pace:.3g} s pass in each of its seconds"
     return _stamps_doubt(tables, start_s, end_s)
 

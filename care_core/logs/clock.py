@@ -25,6 +25,13 @@ STEP_S = 5.0
 """A longer step forward is looked at; most are pauses of the recording."""
 PAUSE_S = 86_400.0
 """A longer step forward is a clock that was set, no pause."""
+PACE = 1.2
+"""How far two clocks of one flight may run apart: in 24 logs of four firmwares they agree to 0.3 %."""
+_PIECE_S, _PIECES, _WRONG = 10.0, 3, 0.1
+"""Seconds in which their paces are compared, fewest such pieces, and the share of them that may differ: what waits for
+a link comes late and then at once."""
+_RESTARTS = 5
+"""Of one vehicle in one log; of two that speak under one name each message seems to be one."""
 _STEADY = 20  # records in a row that agree with each other say what the clock is
 
 
@@ -69,6 +76,47 @@ class OwnClock(Record, eq=False):
             return 0.0
         late_s = self.stamps_s - self.seconds
         return float(late_s[row:].min() - median(late_s[before]))
+
+
+class VehicleTime(Record, eq=False):
+    """The vehicle's own time, where the clock of who recorded it cannot be believed: seconds since its first message,
+    by the bytes of the records that tell it, both of shape (k,) and ascending."""
+
+    places: Offsets
+    seconds: Floats
+    pace: float
+    """Seconds of the vehicle in one of the recorder's clock."""
+
+    @property
+    def duration_s(self) -> float:
+        return float(self.seconds[-1])
+
+    def at(self, places: Offsets) -> Floats:
+        """The time of records at these bytes: of one that tells none, between its neighbours'."""
+        return np.asarray(np.interp(places, self.places, self.seconds), np.float64)
+
+
+def since_start(own_s: Floats) -> Floats:
+    """What a vehicle says of the time since it was started, going on where it was started again."""
+    restarts = np.append(0.0, np.maximum(own_s[:-1] - own_s[1:], 0.0))
+    going_on: Floats = np.maximum.accumulate(own_s + np.cumsum(np.where(restarts > BACK_S, restarts, 0.0)))
+    return going_on
+
+
+def vehicle_time(own: OwnClock, clock: Clock) -> VehicleTime | None:
+    """The vehicle's own time where the recorder's clock runs too fast or slow against it, or stands; None where the two
+    agree. A simulator runs at its own pace, and a station's clock is set; what the vehicle says is of neither."""
+    restarts = np.count_nonzero(np.diff(own.seconds) < -BACK_S)
+    if len(own.places) < _STEADY or restarts > _RESTARTS:
+        return None
+    true_s, said_s = since_start(own.seconds), clock.seconds(own.stamps_s, own.places)
+    edges = np.searchsorted(true_s, np.arange(true_s[0], true_s[-1], _PIECE_S))
+    true, said = np.diff(true_s[edges]), np.diff(said_s[edges])
+    wrong = ~((said > true / PACE) & (said < true * PACE))
+    if len(true) < _PIECES or float(true[wrong].sum()) <= _WRONG * float(true.sum()):
+        return None
+    pace = float(true.sum() / said.sum()) if said.sum() > 0 else np.inf
+    return VehicleTime(own.places, true_s - true_s[0], pace)
 
 
 def find_clock(stamps_s: Floats, places: Offsets, own: OwnClock | None = None) -> tuple[Clock, Bools, list[Damage]]:

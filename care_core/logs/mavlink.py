@@ -21,7 +21,7 @@ from care_core.errors import LogError
 from care_core.logs import formats, shared_id
 from care_core.logs.ardupilot import Built, facts_of, history, shortest
 from care_core.logs.base import Channel, Table, Wanted
-from care_core.logs.clock import OwnClock, find_clock
+from care_core.logs.clock import OwnClock, find_clock, vehicle_time
 from care_core.logs.damage import summarised
 from care_core.logs.file_windows import FileArray
 from care_core.logs.formats import is_raw_mavlink
@@ -74,7 +74,8 @@ class Sender(NamedTuple):
 
 class MavlinkLog:
     """A telemetry log, seen from its vehicle: the system whose autopilot sent most messages. Times are when the
-    ground station received a packet, in seconds from its first.
+    ground station received a packet, in seconds from its first; where its clock goes wrong against the vehicle's own
+    time, they are that.
 
     Raises:
         LogError: the file cannot be read, or holds no packet.
@@ -93,10 +94,13 @@ class MavlinkLog:
             raise LogError("The log holds no sound MAVLink packet.", hint="Copy it again.", where=str(path))
         seconds = stamps(data, packets.start)
         rows, own = boot_clock(data, packets)
-        self._clock, impossible, jumps = find_clock(
-            seconds, packets.start, OwnClock(packets.start[rows], own, seconds[rows])
-        )
+        said = OwnClock(packets.start[rows], own, seconds[rows])
+        self._clock, impossible, jumps = find_clock(seconds, packets.start, said)
         self._first_stamp_s = float(seconds[~impossible][0])
+        self._own_time = vehicle_time(said, self._clock)
+        if self._own_time is not None:  # then no stamp counts
+            impossible, jumps = np.zeros_like(impossible), []
+        self.duration_s = (self._own_time or self._clock).duration_s
         lost = [Damage("a packet's time is impossible", byte) for byte in packets.start[impossible].tolist()]
         unknown, broken = self._between(data, packets)
         kept = packets.where(~impossible)
@@ -104,7 +108,6 @@ class MavlinkLog:
         self.vehicle = self._senders[0]
         self._starts = _by_channel(kept, self.vehicle)
         self._unknown = {f"UNKNOWN {name}": found for name, found in _by_channel(unknown, self.vehicle).items()}
-        self.duration_s = self._clock.duration_s
         self.damage = (
             *summarised(jumps, "clock jumps"),
             *summarised(lost, "packets with an impossible time"),
@@ -158,6 +161,10 @@ class MavlinkLog:
             facts["stack"] = "PX4"
         if self._is_restamped:
             facts["clock"] = "seconds since the vehicle was started, as its messages say"
+        elif self._own_time is not None:
+            facts["clock"] = (
+                f"the vehicle's own: {self._own_time.pace:.2g} s of it in one of the ground station's clock"
+            )
         facts["system"] = f"{self.vehicle.system}.{self.vehicle.component}"
         others = [sender for sender in self._senders[1:] if sender.system != self.vehicle.system]
         if others:
@@ -181,7 +188,8 @@ class MavlinkLog:
         return datetime.fromtimestamp(self._first_stamp_s, timezone.utc).isoformat(timespec="seconds")
 
     def _times(self, data: FileArray, start: Offsets) -> Floats:
-        return self._clock.seconds(stamps(data, start), start)
+        """When packets came, or were sent where the station's clock goes wrong."""
+        return self._clock.seconds(stamps(data, start), start) if self._own_time is None else self._own_time.at(start)
 
     def _rank(self, data: FileArray, packets: Packets) -> tuple[Sender, ...]:
         """Everybody heard, the vehicle's autopilot first, then by number of messages.
@@ -241,7 +249,7 @@ class MavlinkLog:
         times = self._times(data, packets.start)
         before = np.searchsorted(packets.start, [low for low, _ in sorted(damage)]) - 1
         return framed.where(is_unknown), [
-            Damage(text, low, float(times[at]) if at >= 0 and 0.0 <= times[at] <= self._clock.duration_s else None)
+            Damage(text, low, float(times[at]) if at >= 0 and 0.0 <= times[at] <= self.duration_s else None)
             for (low, text), at in zip(sorted(damage), before.tolist(), strict=True)
         ]
 

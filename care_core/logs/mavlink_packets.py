@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.logs.ardupilot import text_of
+from care_core.logs.clock import since_start
 from care_core.logs.file_windows import Bytes, FileArray
 from care_core.numbers import Floats
 from care_core.records import Record
@@ -26,7 +27,7 @@ STAMP_BYTES = 8
 V1, V2 = 0xFE, 0xFD
 _SIGNED = 0x01
 _SIGNATURE_BYTES = 13
-_BOOT_TIME, _RESTART_S = "time_boot_ms", 1.0
+_BOOT_TIME = "time_boot_ms"
 """A time so much earlier than the one before is of another start of the vehicle; less is a message overtaken."""
 _HEAD_BYTES, _LONGEST = 12, 280
 """Bytes of the shortest packet, and of the longest: head, 255 of payload, checksum, signature."""
@@ -124,9 +125,7 @@ def _boot_times(data: FileArray, packets: Packets) -> Floats | None:
     rows, own = boot_clock(data, packets)
     if not len(rows):
         return None
-    restarts = np.append(0.0, np.maximum(own[:-1] - own[1:], 0.0))
-    own = np.maximum.accumulate(own + np.cumsum(np.where(restarts > _RESTART_S, restarts, 0.0)))
-    return np.asarray(np.interp(np.arange(len(packets)), rows, own), np.float64)
+    return np.asarray(np.interp(np.arange(len(packets)), rows, since_start(own)), np.float64)
 
 
 def boot_clock(data: FileArray, packets: Packets) -> tuple[NDArray[np.intp], Floats]:

@@ -38,9 +38,20 @@ def check_not_judged(code: int, objectives: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("clock", restamped.CLOCKS)
 @pytest.mark.parametrize("source", [GOOD, FAILED], ids=["good", "failed"])
-@pytest.mark.parametrize("kind", ["BIN", "tlog"])
-def test_a_flight_whose_clock_is_broken(care: Care, tmp_path: Path, kind: str, source: Path, clock: str) -> None:
-    check_not_judged(*judged(care, restamped.written(tmp_path, source, restamped.CLOCKS[clock], kind)))
+def test_a_flight_whose_clock_is_broken(care: Care, tmp_path: Path, source: Path, clock: str) -> None:
+    check_not_judged(*judged(care, restamped.written(tmp_path, source, restamped.CLOCKS[clock], "BIN")))
+
+
+@pytest.mark.parametrize("clock", restamped.CLOCKS)
+@pytest.mark.parametrize("source", [GOOD, FAILED], ids=["good", "failed"])
+def test_telemetry_whose_clock_is_broken_is_judged_by_the_vehicles_own_time_or_not_at_all(
+    care: Care, tmp_path: Path, source: Path, clock: str
+) -> None:
+    sound = judged(care, restamped.written(tmp_path, source, lambda stamp: stamp, "tlog"))[1]
+    broken = judged(care, restamped.written(tmp_path, source, restamped.CLOCKS[clock], "tlog"))[1]
+    for name, one in broken.items():
+        if one["status"] != "not_evaluated":
+            assert (one["status"], one["value"]) == (sound[name]["status"], pytest.approx(sound[name]["value"], 0.02))
 
 
 def test_a_receiver_that_stands_still_is_a_finding(care: Care, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from care_core.logs.clock import OwnClock, clock_of, find_clock
+from care_core.logs.clock import OwnClock, VehicleTime, clock_of, find_clock, vehicle_time
 from care_core.numbers import Floats
 from tests.whole import examples
 
@@ -106,3 +106,36 @@ def test_a_clock_found_piece_by_piece_is_the_same(steps: list[float], size: int)
     np.testing.assert_array_equal(clock.places, whole.places)
     lost = {place for first, last in spans for place in at.tolist() if first <= place <= last}
     assert lost == set(at[impossible].tolist())
+
+
+def heard(own_s: Floats, station_s: Floats) -> VehicleTime | None:
+    """The vehicle's time of records of 50 bytes that a station stamped so."""
+    places = np.arange(len(own_s), dtype=np.int64) * 50
+    clock, _, _ = find_clock(station_s, places)
+    return vehicle_time(OwnClock(places, own_s, station_s), clock)
+
+
+@pytest.mark.parametrize("pace", [0.0, 0.12, 0.6, 1.5, 20.0])
+def test_a_clock_that_runs_wrong_gives_way_to_the_vehicles_own_time(pace: float) -> None:
+    own_s = 30.0 + np.arange(0.0, 120.0, 0.25)
+    found = heard(own_s, 1.6e9 + pace * own_s)
+    assert found is not None
+    assert found.duration_s == pytest.approx(own_s[-1] - own_s[0])
+    assert found.at(np.array([50, 75])) == pytest.approx([0.25, 0.375])
+    assert pace == 0.0 or found.pace == pytest.approx(1 / pace, rel=0.05)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 3.0, 9.0])
+def test_what_waits_for_a_link_now_and_then_keeps_the_stations_clock(late_s: float) -> None:
+    own_s = np.arange(0.0, 600.0, 0.25)
+    waits = (own_s > 200.0) & (own_s < 200.0 + late_s)
+    assert heard(own_s, 1.6e9 + np.where(waits, 200.0 + late_s, own_s)) is None
+
+
+def test_a_vehicle_that_starts_again_has_one_time_that_goes_on() -> None:
+    own_s = np.concatenate([np.arange(0.0, 60.0, 0.25), np.arange(2.0, 60.0, 0.25)])
+    assert heard(own_s, 1.6e9 + np.arange(len(own_s)) * 0.25) is None
+    found = heard(own_s, 1.6e9 + np.arange(len(own_s)) * 2.5)
+    assert found is not None
+    assert np.all(np.diff(found.seconds) >= 0.0)
+    assert found.duration_s == pytest.approx(len(own_s) * 0.25, abs=1.0)

@@ -380,7 +380,7 @@ def _ranges(numbers: Sequence[int]) -> str:
 
 def _clock(flight: Flight) -> Iterator[Event]:
     if "clock" in flight.log.facts:
-        yield Event(0.0, "log", f"the log has no times: they are {flight.log.facts['clock']}", "the log")
+        yield Event(0.0, "log", f"its times are {flight.log.facts['clock']}", "the log")
 
 
 def _end(flight: Flight) -> Iterator[Event]:
