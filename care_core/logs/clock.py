@@ -87,6 +87,11 @@ class VehicleTime(Record, eq=False):
     pace: float
     """Seconds of the vehicle in one of the recorder's clock."""
 
+    def __str__(self) -> str:
+        if 1 / PACE < self.pace < PACE:
+            return "the vehicle's own: the ground station's clock stalls"
+        return f"the vehicle's own: {self.pace:.2g} s of it pass in one of the ground station's clock"
+
     @property
     def duration_s(self) -> float:
         return float(self.seconds[-1])
