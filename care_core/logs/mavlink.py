@@ -162,9 +162,7 @@ class MavlinkLog:
         if self._is_restamped:
             facts["clock"] = "seconds since the vehicle was started, as its messages say"
         elif self._own_time is not None:
-            facts["clock"] = (
-                f"the vehicle's own: {self._own_time.pace:.2g} s of it in one of the ground station's clock"
-            )
+            facts["clock"] = str(self._own_time)
         facts["system"] = f"{self.vehicle.system}.{self.vehicle.component}"
         others = [sender for sender in self._senders[1:] if sender.system != self.vehicle.system]
         if others:

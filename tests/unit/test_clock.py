@@ -134,8 +134,8 @@ def test_what_waits_for_a_link_now_and_then_keeps_the_stations_clock(late_s: flo
 
 def test_a_vehicle_that_starts_again_has_one_time_that_goes_on() -> None:
     own_s = np.concatenate([np.arange(0.0, 60.0, 0.25), np.arange(2.0, 60.0, 0.25)])
-    assert heard(own_s, 1.6e9 + np.arange(len(own_s)) * 0.25) is None
-    found = heard(own_s, 1.6e9 + np.arange(len(own_s)) * 2.5)
+    assert heard(own_s, seconds(len(own_s), 1.6e9, 0.25)) is None
+    found = heard(own_s, seconds(len(own_s), 1.6e9, 2.5))
     assert found is not None
     assert np.all(np.diff(found.seconds) >= 0.0)
     assert found.duration_s == pytest.approx(len(own_s) * 0.25, abs=1.0)
