@@ -63,7 +63,8 @@ def _crash_of(run: Run, findings: Sequence[Finding]) -> Finding | None:
 
 
 def _contradicted(check: OutcomeCheck, title: str, how: str) -> OutcomeCheck:
-    if check.name in _FAILED and check.value == 1.0:
+    unjudged = check.name == "no_crash" and not is_known(check.value)  # of a flight that was recorded in part
+    if unjudged or (check.name in _FAILED and check.value == 1.0):
         return replace(check, value=0.0, otherwise=how)
     if check.name == "landed" and is_known(check.value):
         return replace(check, value=Unavailable(title))

@@ -18,6 +18,7 @@ from care_core.diagnose.remedies import (
 )
 from care_core.ecosystems.findings import (
     BY_STICK,
+    CUT,
     DROPPED,
     KILLED,
     NOT_FLOWN,
@@ -158,7 +159,7 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
     then = f"; then {again(run, upset=True)}"
     if parts:
         return f"{_mended(parts, findings, run)}{then}"
-    if any(one.title in (DROPPED, KILLED, STOPPED) for one in findings):
+    if any(one.title in (CUT, DROPPED, KILLED, STOPPED) for one in findings):
         return f"{ASK_WHO_CUT}{then}"
     if any(one.title in BY_STICK for one in findings):
         return f"{LOOK_AT_STEERING}{then}"

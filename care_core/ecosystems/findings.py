@@ -145,6 +145,7 @@ BY_STICK = frozenset((STEERED, IDLED))
 """What a pilot's stick brought about: symptoms of which the log does show why."""
 KILLED = "the kill switch cut the motors in the air"
 DROPPED = "it was disarmed in the air, and fell"
+CUT = "its motors stopped in the air, and it fell"
 STOPPED = "the emergency switch stopped the motors in the air"
 UNDRIVEN = "the firmware found a crash while its motors were at rest"
 UNPOWERED = "the motors draw no power"

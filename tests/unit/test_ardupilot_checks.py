@@ -16,7 +16,7 @@ from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import expanded
-from care_core.ecosystems.findings import DROPPED, MONITOR_SILENT, NO_BATTERY, UNCHARGED, Finding, every_finding
+from care_core.ecosystems.findings import CUT, DROPPED, MONITOR_SILENT, NO_BATTERY, UNCHARGED, Finding, every_finding
 from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.ecosystems.spans import runs
 from care_core.logs.base import Table
@@ -1363,6 +1363,15 @@ def test_what_is_disarmed_in_the_air_and_falls_is_told(falls_s: float | None, is
     if falls_s is not None:
         _drop(made, falls_s)
     assert (DROPPED in [one.title for one in made.find()]) is is_told
+
+
+@pytest.mark.parametrize(("pulse_us", "is_told"), [(1000.0, True), (1140.0, False)])
+def test_motors_that_stop_in_the_air_while_it_is_armed_are_told(pulse_us: float, is_told: bool) -> None:
+    made = Made()
+    _drop(made, FAILS_S)
+    for column in made.table["RCOU"].values():
+        column[made.after(FAILS_S)] = pulse_us
+    assert (CUT in {one.title for one in every_finding(made.find())}) == is_told
 
 
 def test_a_height_that_is_set_anew_when_it_is_disarmed_is_no_fall() -> None:

@@ -38,6 +38,12 @@ def test_a_crash_that_the_log_shows_counts_as_one_whatever_the_autopilot_reports
     assert [check.otherwise for check in found.checks if check.value == 0.0] == ["it crashed at 100.0 s (1:40)"] * 2
 
 
+def test_a_crash_of_a_flight_that_was_recorded_in_part_is_one() -> None:
+    partly = Unavailable("the flight was recorded for 56 of 116 s")
+    run = replace(flown(), checks=(OutcomeCheck("no_crash", partly, "none was reported"),))
+    assert values(as_found(run, [CRASH])) == {"no_crash": 0.0}
+
+
 def test_one_that_is_folded_under_its_cause_counts_too() -> None:
     motor = Finding("motor", "motor 2 lost thrust", 98.0, 99.0, "critical", "", "", consequences=(CRASH,))
     assert values(as_found(flown(), [motor]))["no_crash"] == 0.0
