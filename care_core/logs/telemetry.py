@@ -35,7 +35,7 @@ _AS_SENT: Mapping[str, tuple[str, _Scaled]] = {
     "GPS": ("GPS_RAW_INT", {"Status": ("fix_type", 1), "NSats": ("satellites_visible", 1), "HDop": ("eph", 0.01),
                             "Lat": ("lat", 1e-7), "Lng": ("lon", 1e-7), "Alt": ("alt", 1e-3), "Spd": ("vel", 0.01),
                             "GCrs": ("cog", 0.01), "GMS": ("time_usec", 1e-3)}),
-    "CTUN": ("VFR_HUD", {"ThO": ("throttle", 0.01), "Alt": ("alt", 1)}),
+    "CTUN": ("VFR_HUD", {"ThO": ("throttle", 0.01), "Alt": ("alt", 1), "As": ("airspeed", 1)}),
     "RCOU": ("SERVO_OUTPUT_RAW", {f"C{n}": (f"servo{n}_raw", 1) for n in range(1, 17)}),
     "VIBE": ("VIBRATION", {"Clip": ("clipping_0", 1)} | {f"Vibe{axis}": (f"vibration_{axis.lower()}", 1)
                                                          for axis in "XYZ"}),

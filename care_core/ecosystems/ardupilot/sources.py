@@ -59,7 +59,7 @@ SOURCES = (
          mission_lost=WATCHED),
     Live("BAT", ("Curr",), "the current sensor", "battery", _s("current sensor", 30.0), _ANY, is_optional=True,
          mission_lost=WATCHED),
-    Live("ARSP", ("Airspeed",), "the airspeed sensor", "airspeed", _s("airspeed", 5.0), _ANY, is_optional=True,
+    Live("ARSP", ("Airspeed",), "the airspeed sensor", "airspeed", _s("airspeed", 5.0), _SHOWS.place, is_optional=True,
          mission_lost=ASIDE),
     Live("RCOU", tuple(f"C{n}" for n in range(1, 15)), "the record of the motor outputs", "motor", _s("outputs", 10.0),
          _ANY, is_optional=True, mission_lost=WATCHED),

@@ -15,7 +15,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.spans import during
+from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
 from care_core.text import log_time
 
@@ -28,6 +28,8 @@ READS: Wanted = {
 
 LIMITS = Limits()
 _FLIES_MS = LIMITS.add("speed over ground of flight", 8.0, "m/s", "a choice: no plane taxies so fast")
+_NOTHING_MS = LIMITS.add("airspeed that is none", 1.5, "m/s", "a choice: no plane flies so slow, whatever the wind")
+_NOTHING_S = LIMITS.add("shortest time of none in the air", 10.0, "s", "a choice: a blocked tube clears in less")
 _GIVEN_UP_S = LIMITS.add(
     "shortest time for which the firmware gave it up", 3.0, "s", "a choice: a plane flies on as it did for less"
 )
@@ -43,7 +45,7 @@ _FAILED_P = LIMITS.add("probability of a sensor that was given up", 0.9, "", "th
 _LOST_P = LIMITS.add("probability that it costs the mission", 0.2, "", "0 of 3 training flights: it flies on without")
 _STALLS_P = LIMITS.add("probability of a part, in a stall", 0.3, "", "a choice: speeds and gains make it stall as well")
 _HIGH_M = 15.0
-SENSOR_FAILED = "the airspeed sensor failed"
+SENSOR_FAILED, SENSOR_SILENT = "the airspeed sensor failed", "the airspeed sensor reads nothing in the air"
 _FAILS = re.compile(r"Airspeed sensor \d+ failure\. Disabling")
 
 
@@ -54,12 +56,43 @@ def find(flight: Flight) -> Iterator[Finding]:
     moved = flight.one("GPS", "Spd")
     sensor = flight.one("ARSP", "Airspeed")
     is_frozen = bool(flight.repeats("ARSP"))  # told as such
-    if sensor is None:
+    if not is_frozen and (span := _reads_nothing(flight, moved)) is not None:
+        yield _silent(flight, span)
+    elif sensor is None:
         yield from _said_to_fail(flight)
     elif moved is not None and flight.setting("ARSPD_USE") != 0 and not is_frozen:
         yield from _given_up(flight, sensor, moved)
     if flight.kind == "plane":
         yield from _stall(flight)
+
+
+def _reads_nothing(flight: Flight, moved: Table | None) -> Span | None:
+    """From when to when a sensor that is fitted and used reads next to nothing while the plane flies; None where it
+    never does. What is none is estimated from the speed over ground and the wind, and is never so low."""
+    read = flight.one("ARSP", "Airspeed") or flight.one("CTUN", "As")
+    if read is None or moved is None or not flight.setting("ARSPD_TYPE") or not flight.setting("ARSPD_USE"):
+        return None
+    t, airspeed = read.t, read["Airspeed" if "Airspeed" in read.columns else "As"]
+    flies = (np.interp(t, moved.t, moved["Spd"]) > _FLIES_MS) & during(flight.flown, t)
+    spans = lasting(t, flies & (airspeed < _NOTHING_MS), _NOTHING_S)
+    return (spans[0][0], spans[-1][1]) if spans and not (airspeed[flies] >= _FLIES_MS).any() else None
+
+
+def _silent(flight: Flight, span: Span) -> Finding:
+    return Finding(
+        kind="airspeed",
+        title=SENSOR_SILENT,
+        onset_s=span[0],
+        end_s=span[1],
+        severity="warning",
+        evidence=(
+            f"below {_NOTHING_MS:g} m/s in the air, at more than {_FLIES_MS:g} m/s over ground, with "
+            f"ARSPD_TYPE={flight.setting('ARSPD_TYPE'):g} and ARSPD_USE={flight.setting('ARSPD_USE'):g}"
+        ),
+        source="ARSP.Airspeed or VFR_HUD.airspeed against GPS.Spd",
+        probability=_FAILED_P,
+        mission_lost=_LOST_P,
+    )
 
 
 def _given_up(flight: Flight, sensor: Table, moved: Table) -> Iterator[Finding]:
