@@ -30,7 +30,7 @@ from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding, Health
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import CareError, ConfigError
 from care_core.metadata.causal_map import FROM_FLIGHTS, OF_THIS_VEHICLE
-from care_core.metadata.screening import flights_of, plain_refusal
+from care_core.metadata.screening import flights_of, plain_refusal, screened
 from care_core.profile.store import load_profile
 from care_core.records import replace
 from care_core.report.document import ChangeEntry, FixSet
@@ -357,6 +357,12 @@ def test_how_a_vehicle_is_built_its_operator_knows() -> None:
     other = replace(named("FRAME_CLASS"), title="outputs of motors are driven as servos")
     said = check_first(lead("FRAME_CLASS", 14, [other]))  # type: ignore[arg-type]
     assert said == "check first FRAME_CLASS 14: outputs of motors are driven as servos"
+
+
+def test_no_screening_flight_was_flown_at_the_reference() -> None:
+    """It would tell nothing of a value that is off, and of how far that is on the way there."""
+    for kind in ("copter", "plane", "rover", "px4"):
+        assert not [name for name in screened(kind) for one in flights_of(name, kind) if one.value == one.reference]
 
 
 def test_the_value_that_every_screening_flight_had_is_harmless() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from care_core.ecosystems.ardupilot.checks.wings.airspeed import SENSOR_SILENT
 from care_core.ecosystems.findings import Finding, every_finding
 from tests.flights import DOWN_S
 from tests.planes import HEIGHT_M, MadePlane
@@ -312,3 +313,22 @@ def test_a_plane_that_hits_the_ground_and_flies_on_is_told(blow: float, keeps: f
         made.table[table]["AccZ"][made.after(54.2, 54.25)] = -blow
     titles = [one.title for one in every_finding(made.find())]
     assert ("it hit the ground at 18 m/s and flew on" in titles) is is_told
+
+
+@pytest.mark.parametrize(("lean_deg", "is_told"), [(66.0, True), (12.0, False)])
+def test_a_plane_that_comes_down_fast_and_lies_on_its_side_hit_the_ground(lean_deg: float, is_told: bool) -> None:
+    made = MadePlane()
+    falls, lies = (made.t > 70.0) & (made.t <= 75.0), made.t > 75.0
+    height = np.where(falls, 60.0 - 12.0 * (made.t - 70.0), np.where(lies, 0.0, made.table["POS"]["RelHomeAlt"]))
+    made.table["POS"]["RelHomeAlt"] = height
+    made.table["GPS"]["Spd"][lies] = 0.0
+    made.table["ATT"]["Roll"][lies] = lean_deg
+    assert any(one.title.startswith("it hit the ground at 12") for one in every_finding(made.find())) == is_told
+
+
+@pytest.mark.parametrize(("fitted", "is_told"), [(2.0, True), (0.0, False)])
+def test_an_airspeed_sensor_that_is_used_and_reads_nothing_in_the_air_is_told(fitted: float, is_told: bool) -> None:
+    made = MadePlane()
+    made.settings["ARSPD_TYPE"] = fitted
+    made.table["ARSP"]["Airspeed"] = 0.1 * np.abs(made.noise(0.1))
+    assert (SENSOR_SILENT in {one.title for one in every_finding(made.find())}) == is_told

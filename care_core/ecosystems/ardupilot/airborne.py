@@ -369,7 +369,7 @@ class Airborne(Armed):
         said = ((t, text, _SIMULATED_HIT.match(text)) for t, text in self.messages)
         simulated = (Hit(t, float(match[1]), f"the simulator says: {text}") for t, text, match in said if match)
         hits = [one for one in simulated if one.speed_ms > HIT_MS and within(self.armed, one.time_s)]
-        return min((*hits, *self._struck_ground()), key=lambda hit: hit.time_s, default=None)
+        return min((*hits, *self._struck_ground(), *self._lies_on_its_side()), key=lambda hit: hit.time_s, default=None)
 
     def _struck_ground(self) -> Iterator[Hit]:
         table = self.one("IMU", "AccX", "AccY", "AccZ")
@@ -392,6 +392,19 @@ class Airborne(Armed):
                 said = f"a blow of {blow:.0f} m/s^2 stopped it dead from {flew:.1f} m/s"
                 yield Hit(at, flew, said, "something" if is_high else "the ground")
                 return
+
+    def _lies_on_its_side(self) -> Iterator[Hit]:
+        """A plane that came down faster than any lands, and lies on its side from then on: what it felt in the air may
+        be as much as the blow."""
+        attitude = self.one("ATT", "Roll", "Pitch")
+        if attitude is None or not self.is_winged:
+            return
+        leans = attitude.t, np.degrees(np.arccos(_up(attitude["Roll"], attitude["Pitch"])[2]))
+        for _, at in self.airborne:
+            fell, lies = self._fell_ms(at), _after(leans, at)
+            if fell > HIT_MS and len(lies) and float(np.min(lies)) > _ON_SIDE_DEG and self._rests_after(at):
+                lean = float(median(lies))
+                yield Hit(at, fell, f"it came down at {fell:.1f} m/s, and lay at {lean:.0f} degrees from then on")
 
     @cached_property
     def grazed(self) -> Hit | None:
