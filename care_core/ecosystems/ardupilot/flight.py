@@ -36,8 +36,9 @@ STANDS_MS = 0.5
 _LEANS_DEG, _HELD_S = 15.0, 10.0
 """A lean of 15 degrees speeds a copter up by 2.6 m/s^2, to 26 m/s in 10 s, and ANGLE_MAX allows 30 or 45 as shipped. A
 gale holds such a lean still as well, but strikes nothing."""
-_STILL_MS, _LEANS_FAR_DEG, _STILL_S = 0.15, 20.0, 5.0
-"""Nor does a gale of 15 m/s, in which a lean so far stands still, let a copter rest so: its gusts move it."""
+_STILL_MS, _LEANS_FAR_DEG, _STILL_S, _LEANS_ON_DEG = 0.15, 20.0, 5.0, 5.0
+"""Nor does a gale of 15 m/s, in which a lean so far stands still, let a copter rest so: its gusts move it. Whatever it
+was told to lean: one that a motor fails falls. It began to lean on what holds it from the last of these on."""
 _STANDS_S, _WALKS_MS, _IDLES = 5.0, 1.5, 0.1
 """What stood for so long, no faster than a receiver's speed wanders, with less throttle than taxiing takes."""
 _LIFTS = 0.2
@@ -87,22 +88,25 @@ class Flight(Airborne):
     @cached_property
     def held(self) -> tuple[Span, ...]:
         """Spans well above the ground, before it was lost, in which a copter that was struck leans as it is told and
-        yet stands, or one that leans far rests: something holds it."""
+        yet stands, or one that leans far rests, with how it came to lean so: something holds it."""
         moved = self.one("GPS", "Spd", "Status")
         if not self.is_copter or moved is None or not self.flown:
             return ()
         tilt, error, height = self.tilt, self.lean_error, self.height
         if tilt is None or error is None or height is None:
             return ()
-        leans = (np.interp(moved.t, *tilt) > _LEANS_DEG) & (np.interp(moved.t, *height) > OFF_GROUND_M)
-        leans &= np.interp(moved.t, *error) < FOLLOWED_DEG
-        leans &= during(self.flown, moved.t) & (moved["Status"] >= FIX)
+        lean = np.interp(moved.t, *tilt)
+        lifts = (np.interp(moved.t, *height) > OFF_GROUND_M) & during(self.flown, moved.t) & (moved["Status"] >= FIX)
         if self.throttle is not None:  # what lies on its side with its motors down is held by nothing
-            leans &= np.interp(moved.t, *self.throttle) > _LIFTS
-        stands = leans & (moved["Spd"] < STANDS_MS) & (moved.t > self.first_blow_s)
-        rests = leans & (moved["Spd"] < _STILL_MS) & (np.interp(moved.t, *tilt) > _LEANS_FAR_DEG)
-        long = ((stands, _HELD_S), (rests, _STILL_S))
-        return next(filter(None, (_lasting(moved.t, held, least_s) for held, least_s in long)), ())
+            lifts &= np.interp(moved.t, *self.throttle) > _LIFTS
+        follows = np.interp(moved.t, *error) < FOLLOWED_DEG
+        stands = lifts & follows & (lean > _LEANS_DEG) & (moved["Spd"] < STANDS_MS) & (moved.t > self.first_blow_s)
+        if long := _lasting(moved.t, stands, _HELD_S):
+            return long
+        still = lifts & (moved["Spd"] < _STILL_MS)
+        rests = _lasting(moved.t, still & (lean > _LEANS_FAR_DEG), _STILL_S)
+        leans_on = runs(moved.t, still & (lean > _LEANS_ON_DEG), gap_s=1.0)
+        return tuple((a, b) for a, b in leans_on if any(a <= start <= b for start, _ in rests))
 
     def refused_for(self, *words: str, but: str | None = None) -> float | None:
         """When arming was first refused with one of these words, and without another, where that still stood at the
