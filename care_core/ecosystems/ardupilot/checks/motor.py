@@ -60,6 +60,9 @@ _ROOM_FLYING = LIMITS.add(
 _STEADY = LIMITS.add("excess over its swings", 2.0, "", "a choice: what oscillates has all motors up in turn")
 _WINDOW_S = LIMITS.add("window of an excess", 4.0, "s", "a choice: a turn is over sooner")
 _STAYS = LIMITS.add("share of the rest of the flight", 0.7, "", "a choice: a weak motor stays weak")
+_RECORDS = LIMITS.add(
+    "records that tell of one", 16, "", "a choice: of fewer, once a second, a swing of the controller is as well one"
+)
 _LASTS_S = LIMITS.add("shortest excess", 4.0, "s", "a choice: a turn is over sooner")
 _TRYING_S = LIMITS.add("first seconds of trying to lift", 12.0, "s", "a choice: then integrators wind up")
 _LIFTING = LIMITS.add("output that lifts", 0.2, "of the range", "a choice: armed motors idle below it")
@@ -255,7 +258,7 @@ def _of_one(parts: Iterable[Floats], n: int) -> Floats:
 def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     """One motor lastingly above all the others."""
     lifting = _lifting(flight, outputs)
-    if lifting.sum() < 8:
+    if lifting.sum() < _RECORDS:
         return
     t = outputs.t[lifting]
     window = records(t, _WINDOW_S)
