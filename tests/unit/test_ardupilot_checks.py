@@ -286,6 +286,18 @@ def test_a_gps_jump(rate_hz: float, metres: float) -> None:
     assert finding.onset_s == pytest.approx(FAILS_S, abs=1 / rate_hz + 0.1)
 
 
+@pytest.mark.parametrize(("hole_s", "is_told"), [(0.0, True), (9.0, False)])
+def test_a_jump_that_comes_with_a_hole_in_the_log_is_the_holes(hole_s: float, is_told: bool) -> None:
+    made = Made()
+    made.table["GPS"]["Lat"][made.after(FAILS_S)] += 20 * METRE
+    recorded = {
+        name: table.where((table.t < FAILS_S - hole_s) | (table.t >= FAILS_S - 0.15))
+        for name, table in made.tables().items()
+    }
+    findings = every_finding(find(flight_of(recorded, made.known, made.facts, END_S)))
+    assert any(one.title.startswith("the GPS position jumps") for one in findings) == is_told
+
+
 def test_a_step_that_a_vehicle_could_have_flown_between_two_records_is_no_jump() -> None:
     made = Made(rate_hz=0.5)
     made.table["GPS"]["Lat"][made.after(FAILS_S)] += 9.0 * METRE
@@ -296,6 +308,18 @@ def test_a_receiver_whose_velocity_never_fits_tells_of_no_jump() -> None:
     made = Made()
     made.table["GPS"]["Lat"] += made.noise(6.0) * METRE
     assert not [one for one in made.find() if "jumps" in one.title]
+
+
+@pytest.mark.parametrize(("speed_ms", "held"), [(0.05, True), (1.0, False)])
+def test_what_leans_far_beyond_its_demand_and_rests_is_held(speed_ms: float, held: bool) -> None:
+    made = Made()
+    leans = made.after(FAILS_S, FAILS_S + 7)
+    made.table["ATT"]["Roll"][leans] = 30.0
+    made.table["ATT"]["DesRoll"][leans] = 12.0
+    made.table["RCOU"]["C1"][leans] = 1950.0
+    made.table["GPS"]["Spd"][leans] = speed_ms
+    titles = [one.title for one in every_finding(made.find())]
+    assert ("something holds it: it leans and does not move" in titles) == held
 
 
 def test_two_vehicles_whose_records_take_turns_make_no_jump() -> None:

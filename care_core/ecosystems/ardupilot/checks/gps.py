@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.log import holes
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting
 from care_core.ecosystems.base import Check, Limits
@@ -42,6 +43,7 @@ _LEAPS_S, _LEAP_M = (
 _TIMES_USUAL = LIMITS.add("jump over the usual ones", 5.0, "", "a choice: a velocity that never fits tells nothing")
 _LARGE = LIMITS.add("critical jump, in limits", 3.0, "", "a choice: the vehicle follows it")
 _SPEED_MS = LIMITS.add("speed that explains a step", 1.0, "m/s", "a choice: one at rest has a speed, too")
+_AFTER_S = LIMITS.add("after a hole in the log", 1.5, "s", "a choice: what it missed is recorded soon")
 _STEP_S = LIMITS.add("longest step", 3.0, "s", "a choice: over a longer one anything may have happened")
 FEWEST = LIMITS.add("fewest satellites", 6, "", "AP_NavEKF3_VehicleStatus.cpp")
 FALL = LIMITS.add("satellites lost at once", 3, "", "a choice: of those that there were")
@@ -122,6 +124,7 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     limit = JUMP_M + 0.25 * ACCELERATION * np.minimum(dt, 1.5) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
     limit = np.maximum(limit, _TIMES_USUAL * quantile(off, 0.9))  # a velocity that never fits tells nothing
     late = t[1:] < t[0] + _STEP_S if flight.is_telemetry else np.zeros(len(off), dtype=bool)  # what waited for the link
+    late |= during([(low, high + _AFTER_S) for low, high in holes(flight)], t[1:])  # who knows what went on in them
     late |= np.diff(np.searchsorted(late_at, t)) > 0  # whose record the next one is, nobody knows
     beyond = np.flatnonzero((off > limit) & (dt < _STEP_S) & (dt > 0.01) & ~late)
     if not len(beyond):

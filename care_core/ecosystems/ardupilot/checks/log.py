@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.spans import Span, seconds_in
 from care_core.ecosystems.vehicles import flies
-from care_core.logs.base import Wanted
+from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, pauses
 
 READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "POWR": ("Vcc",)}
@@ -66,24 +67,35 @@ def _other_vehicles(flight: Flight) -> Iterator[Finding]:
         )
 
 
-def _holes(flight: Flight) -> Iterator[Finding]:
-    streams = [table for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
+def holes(flight: Flight) -> list[Span]:
+    """Spans while it was armed of which no steady message tells anything."""
+    streams = _steady(flight)
     if not streams or flight.clock_jumps:
-        return
-    limit = max(_HOLE_S, _TIMES * float(median(np.diff(streams[0].t))))
-    low, high = pauses((table.t for table in streams), limit)
+        return []
+    low, high = pauses((table.t for table in streams), _least_hole_s(streams))
     inside = _inside(flight, low, high)
-    low, high = low[inside], high[inside]
-    if len(low):
-        total = float((high - low).sum())
+    return list(zip(low[inside].tolist(), high[inside].tolist(), strict=True))
+
+
+def _steady(flight: Flight) -> list[Table]:
+    return [table for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
+
+
+def _least_hole_s(streams: Sequence[Table]) -> float:
+    return max(_HOLE_S, _TIMES * float(median(np.diff(streams[0].t))))
+
+
+def _holes(flight: Flight) -> Iterator[Finding]:
+    if found := holes(flight):
+        total = seconds_in(found)
         if flight.is_telemetry:
             yield Finding(
                 kind="radio",
                 title="telemetry was interrupted",
-                onset_s=float(low[0]),
-                end_s=float(high[-1]),
+                onset_s=found[0][0],
+                end_s=found[-1][1],
                 severity="info",
-                evidence=f"{len(low)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
+                evidence=f"{len(found)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
                 source="times of the telemetry",
                 suspect="world",
                 probability=_HOLE_P,
@@ -91,11 +103,11 @@ def _holes(flight: Flight) -> Iterator[Finding]:
             return
         yield Finding(
             kind="log",
-            title=f"the log has {len(low)} hole{'s' * (len(low) > 1)}",
-            onset_s=float(low[0]),
-            end_s=float(high[-1]),
+            title=f"the log has {len(found)} hole{'s' * (len(found) > 1)}",
+            onset_s=found[0][0],
+            end_s=found[-1][1],
             severity="warning",
-            evidence=f"{total:.1f} s without any record (limit {limit:.0f} s)",
+            evidence=f"{total:.1f} s without any record (limit {_least_hole_s(_steady(flight)):.0f} s)",
             source="times of ATT, RCOU, CTUN, IMU",
             probability=_HOLE_P,
         )
