@@ -35,6 +35,9 @@ _OUT = LIMITS.add("surface that is out", 0.25, "of its travel", "a choice: trims
 _AGAINST_DPS = LIMITS.add("rate against its surface", 15.0, "deg/s", "a choice: gusts bring less")
 _TURNED_DEG = LIMITS.add("turn against its surface", 25.0, "deg", "a choice: a swing comes back sooner")
 _AGAINST_S = LIMITS.add("shortest time against its surface", 0.5, "s", "a choice: a gust is over sooner")
+_TUMBLES_S = LIMITS.add(
+    "time after control was lost", 3.0, "s", "a choice: a surface that took it turns it against itself at once"
+)
 _STOP = LIMITS.add("surface at its stop", 0.85, "of its travel", "a choice: what is left hardly turns the plane")
 _STOP_S = LIMITS.add("shortest time at the stop", 5.0, "s", "a choice: a turn is over sooner")
 _LACKS_DPS = LIMITS.add("rate that is lacking at the stop", 4.0, "deg/s", "a choice: three times the noise of a rate")
@@ -111,6 +114,8 @@ def _flown(flight: Flight, surface: _Surface, level: Floats) -> _Flown | None:
         return None
     t = rates.t
     acts = (np.interp(t, moved.t, moved["Spd"]) > _FLIES_MS) & during(flight.armed, t)
+    if flight.lost_control_s is not None:  # what tumbles turns against its surfaces, whichever way they act
+        acts &= t < flight.lost_control_s + _TUMBLES_S
     if acts.sum() < _FEWEST:
         return None
     out = np.interp(t, outs.t, outs[surface.output]) / _FULL
