@@ -12,6 +12,7 @@ from care_core.diagnose.remedies import (
     CHARGE,
     CLEAR_REFUSAL,
     LAND_EARLIER,
+    LOOK_AT_ITS_WAY,
     LOOK_AT_STEERING,
     TUNE,
     remedy,
@@ -23,6 +24,7 @@ from care_core.ecosystems.findings import (
     KILLED,
     NOT_FLOWN,
     STOPPED,
+    STRUCK,
     Finding,
     FindingKind,
     every_finding,
@@ -161,6 +163,8 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
         return f"{_mended(parts, findings, run)}{then}"
     if any(one.title in (CUT, DROPPED, KILLED, STOPPED) for one in findings):
         return f"{ASK_WHO_CUT}{then}"
+    if any(one.title == STRUCK for one in findings):
+        return f"{LOOK_AT_ITS_WAY}{then}"
     if any(one.title in BY_STICK for one in findings):
         return f"{LOOK_AT_STEERING}{then}"
     swung = next((one.title for one in findings if one.kind == "tuning" and one.severity == "critical"), None)

@@ -27,6 +27,7 @@ LAND_EARLIER = "land earlier, or fly with a fuller, larger or newer battery"
 CLEAR_REFUSAL = "clear what refused arming: {why}"
 ASK_WHO_CUT = "ask why the motors were cut, and check what the fall broke"
 LOOK_AT_STEERING = "look at how it was steered: its throttle stick was down"
+LOOK_AT_ITS_WAY = "look for what stands in its way there, and send it higher or around it"
 TUNE = "look at the gains and filters of what swings ({title})"
 """Remedies that the next step chooses by more than the title and kind of one finding."""
 

@@ -14,7 +14,7 @@ from typing import Literal, Protocol, TypeVar
 
 from care_core.diagnose.next_step import next_step
 from care_core.diagnose.records import MISSION_FAILED, UNLIKELY, Confidence, Diagnosis, Hypothesis, Since, Status, helps
-from care_core.ecosystems.findings import BY_STICK, WHOLE_LOG, FindingKind, Severity, SuspectKind
+from care_core.ecosystems.findings import SHOW_WHY, WHOLE_LOG, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
 from care_core.records import Record, replace
@@ -522,6 +522,6 @@ def _explanation(one: Hypothesis, findings: Sequence[SeenFinding], outside: Sequ
         return f"the parameter {next((suspect.text for suspect in outside if suspect.name == one.name), one.name)}"
     if one.name:
         is_symptom = any(finding.title == one.name and finding.kind in SYMPTOMS for finding in findings)
-        is_symptom &= one.name not in BY_STICK
+        is_symptom &= one.name not in SHOW_WHY
         return f"{one.name}; the log does not show why" if is_symptom else one.name
     return "bad luck: this mission sometimes fails with the reference settings too"

@@ -141,8 +141,11 @@ BATTERY_FAILSAFE = "battery failsafe"
 STEERED = "it flew into the ground as steered"
 SPINS = "it spins against its control"
 IDLED = "control was lost with the throttle stick at its bottom"
+STRUCK = "it hit something"
 BY_STICK = frozenset((STEERED, IDLED))
-"""What a pilot's stick brought about: symptoms of which the log does show why."""
+"""What a pilot's stick brought about."""
+SHOW_WHY = BY_STICK | {STRUCK}
+"""Symptoms of which the log does show why."""
 KILLED = "the kill switch cut the motors in the air"
 DROPPED = "it was disarmed in the air, and fell"
 CUT = "its motors stopped in the air, and it fell"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -66,6 +66,8 @@ _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
 _SHOCK, _HARD = 30.0, 5.0
 """m/s^2: three times gravity is no flight, and so many times that is no motor that broke."""
+_CALM_S, _SAME_BLOW_S = 5.0, 0.3
+"""A blow out of the blue: none came for so long, and its sensor clips with it."""
 _STOPS_S, _MOVES_MS, _STOPPED = 0.8, 2.5, 0.3
 """What a blow stops has less than this share of its speed so shortly after; a copter that brakes takes longer."""
 HIT_MS = 3.0
@@ -529,7 +531,7 @@ class Airborne(Armed):
         flown = [(t, felt) for t, felt in before if within(self.airborne, t)]
         moved = self.one("GPS", "Spd")
         hard = (t for t, felt in flown if felt > _HARD * _SHOCK or _stops_at(moved, t))
-        return min((*hard, *just_before), default=None)
+        return min((*hard, *just_before, *_out_of_the_blue(flown)), default=None)
 
     def _last_followed_s(self, until: float) -> float:
         """When it last followed its attitude demand before a time."""
@@ -562,6 +564,15 @@ class Airborne(Armed):
         for one in self.all("VIBE", "Clip"):
             clipped = np.append(False, np.diff(one["Clip"]) > 0)
             yield from ((t, 0.0) for t in one.t[clipped].tolist())
+
+
+def _out_of_the_blue(blows: Sequence[tuple[float, float]]) -> Iterator[float]:
+    """Blows that were too much for a sensor after a while without any: what shakes itself does so again and again."""
+    shocks, clipped = [t for t, felt in blows if felt > _SHOCK], [t for t, felt in blows if not felt]
+    for at in shocks:
+        is_first = not any(at - _CALM_S < t < at - _SAME_BLOW_S for t, _ in blows)
+        if is_first and any(abs(t - at) < _SAME_BLOW_S for t in clipped):
+            yield at
 
 
 def _first_above(series: tuple[Floats, Floats] | None, least: float, start: float, end: float) -> float | None:

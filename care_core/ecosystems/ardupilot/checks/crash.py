@@ -10,7 +10,7 @@ from care_core.ecosystems.ardupilot.airborne import ACRO, OFF_GROUND_M
 from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import CAME_DOWN, STEERED, UNDRIVEN, Finding
+from care_core.ecosystems.findings import CAME_DOWN, STEERED, STRUCK, UNDRIVEN, Finding
 from care_core.ecosystems.vehicles.errors import CRASH_CHECK
 from care_core.logs.base import Wanted
 
@@ -31,6 +31,8 @@ _TIPPED_P = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a 
 _BY_STICKS_P = LIMITS.add("probability that the sticks turned it over", 0.5, "", "a choice: in acro they do, or a part")
 _CRASHED_P = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
 _STEERED_P = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
+_CAUGHT_P = LIMITS.add("probability that it lies on what brought it down", 0.9, "", "nothing else holds it up there")
+_STRUCK_P = LIMITS.add("probability that a blow brought it down", 0.5, "", "a choice: a part that breaks strikes, too")
 _STRANDED_P = LIMITS.add(
     "probability of what could not rise", 0.0, "", "it says that the run failed, and nothing of why"
 )
@@ -82,17 +84,27 @@ def find(flight: Flight) -> Iterator[Finding]:
             "a blow came before control was lost" if flight.blow_s is not None and not landing else "",
             "it turned over and did not fall: it lies on what it hit" if flight.is_caught else "",
         )
+        title = UNDRIVEN if undriven else "it turned over" if over else _what(flight, steered, landing=landing)
         yield Finding(
             kind="crash",
-            title=UNDRIVEN if undriven else "it turned over" if over else _what(flight, steered, landing=landing),
+            title=title,
             onset_s=first,
             end_s=first,
             severity="critical",
             evidence="; ".join(filter(None, shown)),
             source="ERR 12, MSG, ATT, IMU, height",
-            suspect="operation" if steered or by_sticks or landing else "hardware",
-            probability=_STEERED_P if steered else _BY_STICKS_P if by_sticks or landing else _CRASHED_P,
+            suspect="operation" if steered or by_sticks or landing else "world" if title == STRUCK else "hardware",
+            probability=_of(flight, title, by_sticks=by_sticks or landing),
         )
+
+
+def _of(flight: Flight, title: str, *, by_sticks: bool) -> float:
+    """How surely what is told of a crash is why it came down."""
+    if title == STEERED:
+        return _STEERED_P
+    if title == STRUCK:
+        return _CAUGHT_P if flight.is_caught else _STRUCK_P
+    return _BY_STICKS_P if by_sticks else _CRASHED_P
 
 
 def _what(flight: Flight, steered: str, *, landing: bool) -> str:
@@ -101,7 +113,7 @@ def _what(flight: Flight, steered: str, *, landing: bool) -> str:
     if steered:
         return STEERED
     if flight.struck_s is not None:
-        return "it hit something"
+        return STRUCK
     hit = flight.ending_hit
     return "it crashed" if hit is None else f"it hit {hit.what} at {hit.speed_ms:.1f} m/s"
 

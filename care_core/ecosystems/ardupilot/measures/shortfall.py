@@ -23,6 +23,7 @@ _FAILSAFE_OF = re.compile(r"battery|radio|throttle|GCS|EKF|terrain|fence|leak|GP
 _BEGUN_S, _AT_ONCE_S = 1.0, 2.0
 """An arming so soon after the log begins may be older; a failsafe so soon after an arming was on before: BATT_LOW_TIMER
 alone is 10 s."""
+_VOWELS = frozenset("AEIOaeio")
 _LONGEST = 60
 """Characters of a message that stands in a clause."""
 
@@ -83,7 +84,7 @@ def event_clause(mission: Mission, kind: str) -> str:
         return ""
     time_s, words = min(found, key=lambda one: one[0])
     if words.endswith(" failsafe") and mission.start_s > _BEGUN_S and time_s - mission.start_s < _AT_ONCE_S:
-        return f"it was armed with a {words} on"
+        return f"it was armed with {'an' if words[0] in _VOWELS else 'a'} {words} on"
     return f"{words} at {log_time(time_s)}"
 
 
