@@ -16,7 +16,16 @@ from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import expanded
-from care_core.ecosystems.findings import CUT, DROPPED, MONITOR_SILENT, NO_BATTERY, UNCHARGED, Finding, every_finding
+from care_core.ecosystems.findings import (
+    CUT,
+    DROPPED,
+    MONITOR_SILENT,
+    NO_BATTERY,
+    STRUCK,
+    UNCHARGED,
+    Finding,
+    every_finding,
+)
 from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.ecosystems.spans import runs
 from care_core.logs.base import Table
@@ -198,6 +207,18 @@ def test_a_blow_before_control_is_lost_blames_no_motor() -> None:
     findings = made.find()
     assert not any(one.kind == "motor" for one in findings)
     assert made.flight().impact_s == pytest.approx(FAILS_S - 0.2, abs=0.05)
+
+
+@pytest.mark.parametrize(("shakes_s", "is_told"), [(FAILS_S - 4.0, True), (FAILS_S - 7.0, False)])
+def test_a_blow_out_of_the_blue_that_a_sensor_clips_at_is_what_it_hit(shakes_s: float, is_told: bool) -> None:
+    """What shakes itself clips again and again."""
+    made = Made()
+    falling(made, -60.0, 40.0)
+    struck = made.after(FAILS_S - 4.0, FAILS_S - 3.9)
+    made.table["IMU"]["AccX"][struck] = 45.0
+    for name in ("VIBE", "VIBE#2"):
+        made.table[name]["Clip"] = np.where(made.t > shakes_s, 1.0, 0.0) + np.where(made.t > FAILS_S - 4.0, 1.0, 0.0)
+    assert (STRUCK in {one.title for one in every_finding(made.find())}) == is_told
 
 
 def test_a_stopped_controller_is_told_by_its_speed() -> None:
