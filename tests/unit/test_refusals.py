@@ -233,6 +233,15 @@ def test_a_receiver_that_never_answers_is_the_reason_and_its_operator_knows_why(
     assert "GPS_TYPE" not in dict(finding.wanted)
 
 
+def test_how_a_real_vehicle_is_mounted_is_looked_at_before_it_is_put_back() -> None:
+    turned = {"COMPASS_ORIENT": (6.0, 0.0)}
+    real = refused_at(12.6, ("Compasses inconsistent",), turned)
+    assert (real.parameters, real.wanted) == (("COMPASS_ORIENT",), ())
+    assert "COMPASS_ORIENT is 6 (default 0): check it first" in real.evidence
+    simulated = refused_at(12.6, ("Compasses inconsistent",), {**turned, "SIM_SPEEDUP": (1.0, 1.0)})
+    assert simulated.wanted == (("COMPASS_ORIENT", 0.0),)
+
+
 def test_what_is_only_a_little_off_is_not_blamed() -> None:
     finding = refused("AHRS: waiting for home", EK3_POSNE_M_NSE=(0.6, 0.5), EK3_VELNE_M_NSE=(5.0, 0.3))
     assert finding.parameters == ("EK3_VELNE_M_NSE",)

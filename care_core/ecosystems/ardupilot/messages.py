@@ -197,7 +197,7 @@ _SENSORS: Dictionary = {
             **_PLACE,
             "NSats": Field(label="satellites"),
             "HDop": Field(label="horizontal dilution", plausible=(0, 655.35)),
-            "Spd": Field("m/s", "speed over ground"),
+            "Spd": Field("m/s", "speed over ground", plausible=(0, 600)),  # receivers give up at 515
         },
         ("GPS2", "GPSB"), "I", fastest_hz=100.0, **_set(4, "GPS"),
     ),

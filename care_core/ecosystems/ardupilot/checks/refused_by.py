@@ -15,7 +15,7 @@ from care_core.ecosystems.base import Limits
 from care_core.ecosystems.lithium import CHARGED_V, HARMED_V
 from care_core.ecosystems.way_back import way_back
 from care_core.metadata.ardupilot import firmware_default
-from care_core.metadata.causal_map import SET_BY_HAND, Role, meaning_of
+from care_core.metadata.causal_map import OF_THIS_VEHICLE, SET_BY_HAND, Role, meaning_of
 from care_core.metadata.refusals import Must, refusal_reads
 from care_core.run import Setting
 
@@ -141,7 +141,15 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
         yield from (_unanswered(one) for one in unanswered)
     else:
         sure = OFF * OUTSIDE if is_outside else OFF
-        yield from (_refusing(one, sure) for one in held if one.is_far_off)
+        yield from (_unproven(flight, _refusing(one, sure), one) for one in held if one.is_far_off)
+
+
+def _unproven(flight: Flight, refusing: Refusing, one: _Held) -> Refusing:
+    """What a check reads, and nothing shows to be wrong: how a real vehicle is wired and mounted is off the default
+    rightly, and its operator looks at it before it is put back."""
+    if flight.is_simulated or one.role not in OF_THIS_VEHICLE:
+        return refusing
+    return refusing._replace(wanted=None, words=f"{refusing.words.partition(':')[0]}: {way_back(one.name, None, None)}")
 
 
 def _is_without(flight: Flight) -> bool:
