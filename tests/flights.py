@@ -22,7 +22,12 @@ QUAD_X: Mapping[str, float] = {
     **{f"SERVO{n}_FUNCTION": 32 + n for n in range(1, 5)},
 }  # fmt: skip
 FACTS = {"firmware": "ArduCopter V4.5.4 (fd1bcc61)", "vehicle": "multicopter"}
-_METRE = 1 / 111319.5
+METRE = 1 / 111319.5
+"""In degrees."""
+RATES = (0.5, 1.0, 2.5, 10.0, 50.0)
+FAILS_S = 50.0
+"""When what a test plants begins."""
+JUMP = Damage("the clock jumps", 0, 40.0, is_jump=True)
 
 
 def flight_of(
@@ -111,7 +116,7 @@ class Made:
             "ThO": throttle, "Alt": height.copy(), "BAlt": height.copy(), "DAlt": height.copy(), "ThI": throttle.copy(),
         }  # fmt: skip
         add["POS"] = {
-            "Lat": 47.0 + north * _METRE, "Lng": np.full(n, 8.0), "RelHomeAlt": height + self.noise(0.02),
+            "Lat": 47.0 + north * METRE, "Lng": np.full(n, 8.0), "RelHomeAlt": height + self.noise(0.02),
         }  # fmt: skip
         add["RCOU"] = {f"C{k}": 1000 + 950 * throttle + np.where(up, self.noise(8), 0) for k in range(1, 5)}
         for number in ("", "#2"):
@@ -135,7 +140,7 @@ class Made:
             }  # fmt: skip
         add["GPS"] = {
             "Status": np.full(n, 3.0), "NSats": np.full(n, 14.0), "HDop": np.full(n, 0.8),
-            "Lat": 47.0 + (north + self.noise(0.05)) * _METRE, "Lng": 8.0 + self.noise(0.05) * _METRE,
+            "Lat": 47.0 + (north + self.noise(0.05)) * METRE, "Lng": 8.0 + self.noise(0.05) * METRE,
             "Alt": 400 + height + self.noise(0.3), "Spd": speed, "GCrs": np.zeros(n),
         }  # fmt: skip
         volts = 12.5 - np.where(up, 0.5, 0.0) - np.interp(t, [UP_S, DOWN_S], [0, 0.5])
@@ -143,3 +148,22 @@ class Made:
         add["POWR"] = {"Vcc": 5.0 + self.noise(0.02)}
         add["XKF4"] = {"C": np.zeros(n), **{f: 0.1 + np.abs(self.noise(0.02)) for f in ("SV", "SP", "SH", "SM")}}
         add["PM"] = {"NLon": np.full(n, 2.0), "NL": np.full(n, 4000.0), "Load": np.full(n, 300.0)}
+
+
+def first(made: Made) -> Finding:
+    findings = made.find()
+    assert findings, "nothing was found"
+    return findings[0]
+
+
+def falling(made: Made, roll: float, pitch: float) -> None:
+    """Control is lost at FAILS_S: it falls to one side within a second, then to the ground, and stays there."""
+    t, lost = made.t, made.after(FAILS_S)
+    grow = np.clip((t - FAILS_S) / 0.5, 0, 1)[lost]
+    made.table["ATT"]["Roll"][lost] = roll * grow
+    made.table["ATT"]["Pitch"][lost] = pitch * grow
+    ground = np.clip(12.0 - 5 * np.maximum(t - FAILS_S, 0) ** 2, 0, None)
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[name][field][lost] = ground[lost]
+    made.rows["ERR"] = [(FAILS_S + 4.0, {"Subsys": 12.0, "ECode": 1.0})]
+    made.rows["ARM"][1] = (FAILS_S + 4.0, {"ArmState": 0.0, "Forced": 0.0})
