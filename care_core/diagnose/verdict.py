@@ -413,7 +413,9 @@ def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding
     onsets = [one.onset_s for one in worst if one.onset_s is not None and _with_time(one) in kept]
     begun_s = min(onsets, default=-math.inf)
     early = [one for one in others if one in kept and _time_told(one) < begun_s]
-    return "; ".join(dict.fromkeys((first, *early, *kept)))
+    told = list(dict.fromkeys((first, *early, *kept)))
+    # Where the first says when it was, what came before it is told before it.
+    return "; ".join(sorted(told, key=_time_told) if _time_told(first) < math.inf else told)
 
 
 _TIME_TOLD = re.compile(r" at (\d+(?:\.\d+)?) s\b")
