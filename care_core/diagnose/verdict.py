@@ -14,7 +14,7 @@ from typing import Literal, Protocol, TypeVar
 
 from care_core.diagnose.next_step import next_step
 from care_core.diagnose.records import MISSION_FAILED, UNLIKELY, Confidence, Diagnosis, Hypothesis, Since, Status, helps
-from care_core.ecosystems.findings import SHOW_WHY, WHOLE_LOG, FindingKind, Severity, SuspectKind
+from care_core.ecosystems.findings import NOT_READY, SHOW_WHY, WHOLE_LOG, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
 from care_core.records import Record, replace
@@ -308,9 +308,10 @@ def compose(
 
 def _but_for(headline: str, text: str) -> str:
     """A text without the end that the headline says in the same words."""
-    told, clauses = headline.casefold(), text.split(": ")
+    told, clauses = headline.casefold(), text.replace(NOT_READY, "").split(": ")
     ends = (index for index in range(len(clauses)) if ": ".join(clauses[index:]).casefold() in told)
-    return ": ".join(clauses[: next(ends, len(clauses))])
+    end = next(ends, None)
+    return text if end is None else ": ".join(clauses[:end])
 
 
 def _others(failed: Sequence[tuple[int, str]]) -> str:

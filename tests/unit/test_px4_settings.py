@@ -100,6 +100,7 @@ def test_what_is_wired_is_put_back_where_a_check_refuses_for_it() -> None:
         ("barometer 0 missing", "SYS_HAS_BARO"),
         ("Not enough GPS Satellites", "EKF2_REQ_NSATS"),
         ("Vehicle is in safety configuration", "COM_ARMABLE"),
+        ("Preflight Fail: ekf2 missing data", "CAL_ACC0_ZSCALE"),
     ],
 )
 def test_a_refusal_is_known_by_its_words(says: str, reads: str) -> None:

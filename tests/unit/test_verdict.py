@@ -200,6 +200,8 @@ def test_what_the_headline_says_is_not_said_again_beside_the_change() -> None:
     refused = [ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", why)]
     first = Advice(refusal=f"check first COMPASS_TYPEMASK 3 (default 0): {why}")
     assert compose("copter", FITS, refused, (), (), first, "").advice.refusal.endswith("COMPASS_TYPEMASK 3 (default 0)")
+    px4 = Advice(refusal="check first CAL_ACC0_ZSCALE 3: not ready to fly: Compass not healthy")
+    assert compose("px4", FITS, refused, (), (), px4, "").advice.refusal == "check first CAL_ACC0_ZSCALE 3"
     changed = Advice("A 1 -> 0", 0.8, 0.1, cause=0.97, why=why)
     told = str(compose("copter", FITS, refused, (), (), changed, "").advice)
     assert told == "Change A 1 -> 0 (97% the cause): 80% probability that all objectives are met; as driven 10%"

@@ -20,6 +20,8 @@ _CHECKS = (
     (r"\bESC\b", "COM_ARM_CHK_ESCS FD_ESCS_EN"),
     (r"magnetic interference", "COM_ARM_MAG_STR EKF2_MAG_CHECK EKF2_MAG_CHK_STR EKF2_MAG_CHK_INC CAL_MAG"),
     (r"no valid .*(attitude|position) estimate", "SYS_HAS_GPS EKF2_EN EKF2_IMU_CTRL EKF2_GPS_CTRL"),
+    # The estimator begins where it feels 0.8 to 1.2 g and turns by less than 15 deg/s (EKF/ekf.cpp: initialiseTilt).
+    (r"ekf2 missing data", "EKF2_EN EKF2_IMU_CTRL CAL_ACC CAL_GYRO"),
     (r"height estimate (error|not stable)", "COM_ARM_EKF_HGT CAL_ACC"),
     (r"velocity estimate error", "COM_ARM_EKF_VEL CAL_ACC"),
     (r"position estimate error", "COM_ARM_EKF_POS CAL_ACC"),
