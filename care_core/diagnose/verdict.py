@@ -414,9 +414,9 @@ def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding
     onsets = [one.onset_s for one in worst if one.onset_s is not None and _with_time(one) in kept]
     begun_s = min(onsets, default=-math.inf)
     early = [one for one in others if one in kept and _time_told(one) < begun_s]
-    told = list(dict.fromkeys((first, *early, *kept)))
+    in_order = list(dict.fromkeys((first, *early, *kept)))
     # Where the first says when it was, what came before it is told before it.
-    return "; ".join(sorted(told, key=_time_told) if _time_told(first) < math.inf else told)
+    return "; ".join(sorted(in_order, key=_time_told) if _time_told(first) < math.inf else in_order)
 
 
 _TIME_TOLD = re.compile(r" at (\d+(?:\.\d+)?) s\b")

@@ -41,9 +41,7 @@ EXPLAINS: Explains = {
     # --- robots that drive by their sensors
     "laser": frozenset(("laser", "localisation", "planner", "blocked", "control", "tf", "software")),
     "localisation": frozenset(("localisation", "planner", "blocked", "control", "tf")),
-    "drive": frozenset(  # what moves while it is disarmed aligns no estimator, and none of its sensors agree
-        ("drive", "planner", "control", "estimator", "compass", "prearm")
-    ),
+    "drive": frozenset(("drive", "planner", "control", "prearm")),
     "commands": frozenset(("drive", "planner", "control")),
     "tf": frozenset(("tf", "planner", "control")),
     "topics": frozenset(("tf", "planner", "control")),  # no topic ends another: a node ends several
@@ -65,6 +63,9 @@ EXPLAINS: Explains = {
     ),
 }  # fmt: skip
 """By physics, not by statistics. A compass loses no fix, and a battery makes no gyro noisy."""
+
+OF_ROVERS: Explains = {**EXPLAINS, "drive": EXPLAINS["drive"] | {"estimator", "compass"}}
+"""What moves while it is disarmed aligns no estimator, and none of its sensors agree."""
 
 _ESTIMATED = "ekf|ahrs|dcm|position|home|velocity|variance"
 _WORDS: Mapping[FindingKind, str] = {

@@ -478,7 +478,7 @@ async def test_enter_on_a_cause_opens_the_fix_at_its_option(make_app: MakeApp) -
     [
         (sample.all_ok(), "nothing to explain", "all objectives are within their thresholds"),
         (sample.abstaining(), "mean lean 19 deg", "mean lean 19 deg"),
-        (sample.not_evaluated(), "nothing to explain", "could not be evaluated"),
+        (sample.not_evaluated(), "nothing to explain", "no fault was found"),
     ],
 )
 async def test_without_a_cause_every_step_says_why(

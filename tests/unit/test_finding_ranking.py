@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.ecosystems.explains import Explains
+from care_core.ecosystems.explains import OF_ROVERS, Explains
 from care_core.ecosystems.findings import NO_BATTERY, OWN_SUPPLY, UNCHARGED, Finding, FindingKind, Severity
 from care_core.ecosystems.ranking import OVER_S, SLACK_S, lost_by, rank_findings
 from care_core.records import replace
@@ -167,6 +167,6 @@ def test_what_drives_while_it_is_disarmed_aligns_no_compass_and_is_refused() -> 
         replace(finding("prearm", 80.0), title=f"arming was refused: {why}", suspect="parameter")
         for why in ("AHRS: DCM Roll/Pitch inconsistent", "RC not found")
     ]
-    told = rank_findings([compass, *refused, drives])
+    told = rank_findings([compass, *refused, drives], explains=OF_ROVERS)
     assert [one.kind for one in told[0].consequences] == ["compass", "prearm"]
     assert [one.title for one in told[1:]] == ["arming was refused: RC not found"]

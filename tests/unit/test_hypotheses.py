@@ -121,6 +121,8 @@ def test_a_vehicle_that_never_armed_failed_by_what_refused_it() -> None:
     assert lead(both) == ("parameter", "RNGFND6_TYPE")
     assert "SERVO3_TRIM" not in {one.name for one in both}
     assert lead(weigh({}, 0.01, [creeps])) == ("parameter", "SERVO3_TRIM")
+    estimated = replace(refused, title="arming was refused: AHRS: not using configured AHRS type")
+    assert lead(weigh({}, 0.01, [creeps, estimated])) == ("parameter", "SERVO3_TRIM"), "what moves aligns no estimator"
     assert lead(weigh({}, 0.01, [poor, refused])) == ("hardware", poor.title), "it may have refused it"
 
 

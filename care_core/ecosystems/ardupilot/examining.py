@@ -11,7 +11,7 @@ from care_core.ecosystems.ardupilot import timeline
 from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded
-from care_core.ecosystems.explains import EXPLAINS
+from care_core.ecosystems.explains import EXPLAINS, OF_ROVERS
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health, OfRun
 from care_core.ecosystems.plausible import clock_doubt
 from care_core.ecosystems.ranking import GRAVITY, rank_findings
@@ -44,7 +44,8 @@ def find(flight: Flight) -> tuple[Finding, ...]:
         return rank_findings(_on_a_bench(found), flight.down_s)
     idle = _unused_at_the_end(flight)
     told = [replace(one, mission_lost=_UNUSED) if one.kind in idle else one for one in found]
-    return rank_findings(told, flight.down_s, {**EXPLAINS, **dict.fromkeys(idle, frozenset[FindingKind]())})
+    explains = OF_ROVERS if flight.kind == "rover" else EXPLAINS
+    return rank_findings(told, flight.down_s, {**explains, **dict.fromkeys(idle, frozenset[FindingKind]())})
 
 
 def _unused_at_the_end(flight: Flight) -> frozenset[FindingKind]:
