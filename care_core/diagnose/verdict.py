@@ -374,22 +374,24 @@ def _failed(
 
 def _unjudged(unknown: Sequence[JudgedObjective], found: str, *, is_all: bool) -> str:
     """Why objectives could not be judged, by their reasons; whose a reason is goes without saying where it is that of
-    many."""
+    many, or the first of many."""
     named: dict[str, list[JudgedObjective]] = {}
     for one in unknown:
         named.setdefault(_CLAUSE.split(one.reason or "")[0], []).append(one)
     if is_all and len(named) == 1 and unknown[0].reason:
         return unknown[0].reason
     room = LINES * LINE - len(f"{STATUS_WORDS['not_evaluated']}: ; {found}") - _BROKEN
-    return "; ".join((*_in_lines([_unjudged_for(group) for group in named.values()], room), found))
+    first, *others = named.values()
+    clauses = [_unjudged_for(first, is_one_of_many=len(unknown) > FEW), *(_unjudged_for(group) for group in others)]
+    return "; ".join((*_in_lines(clauses, room), found))
 
 
-def _unjudged_for(alike: Sequence[JudgedObjective]) -> str:
+def _unjudged_for(alike: Sequence[JudgedObjective], *, is_one_of_many: bool = False) -> str:
     """What kept objectives from being judged that share the first clause of their reasons."""
     told, reason = ", ".join(one.name for one in alike).replace("_", " "), alike[0].reason
     if not reason:
         return f"{told} could not be evaluated"
-    return reason if len(alike) > FEW else f"{told}: {reason}"
+    return reason if is_one_of_many or len(alike) > FEW else f"{told}: {reason}"
 
 
 _CAME_DOWN = ("control was lost at ", "it hit the ground at ")
