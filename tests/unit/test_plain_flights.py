@@ -137,6 +137,19 @@ def test_without_heights_the_land_detector_is_believed() -> None:
     assert not is_known(checks(flown(mode=0, POS=None))["took_off"])
 
 
+@pytest.mark.parametrize(("state", "said"), [(4, "it rose no higher than 0.7 m"), (3, "it never left the ground")])
+def test_a_low_hover_is_told_by_the_heartbeat(state: int, said: str) -> None:
+    at = np.arange(0.0, 75.0, 0.5)
+    height = np.interp(at, [10, 20, 60, 70], [0, 0.7, 0.7, 0])
+    low = {"Lat": np.full_like(at, north(0)), "Lng": HOME[1] + 1e-7 * np.sin(at), "RelHomeAlt": height}
+    beats = table([(t, 1.0, state if 12 < t < 68 else 3.0) for t in np.arange(0.0, 70.0, 1.0)], "Armed", "State")
+    driven = replace(flight()["POS"], times=at, columns={"ThO": np.where(height > 0.1, 0.4, 0.1), "Alt": height})
+    hover = flown(mode=5, POS=replace(flight()["POS"], times=at, columns=low), STAT=beats, CTUN=driven)
+    told = checks(hover)["took_off"]
+    assert isinstance(told, Unavailable)
+    assert told.reason.startswith(said)
+
+
 def test_home_is_no_waypoint() -> None:
     """A real vehicle writes its home, with coordinates, as item 0."""
     items = [(0.0, 0, 16, HOME[0], HOME[1], 584.0), (0.0, 1, 22, 0.0, 0.0, 20.0),

@@ -1,4 +1,4 @@
-"""Failsafes that a vehicle's heartbeat alone tells of.
+"""Failsafes, and a flight too low to tell by its height, that a vehicle's heartbeat alone tells of.
 
 The firmware sends MAV_STATE_CRITICAL while any failsafe is on (GCS_MAVLink: vehicle_system_status), and so it does
 after an internal error (GCS_MAVLINK::system_status).
@@ -11,9 +11,10 @@ import re
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.spans import Span, during
+from care_core.ecosystems.vehicles import flies
 
-_CRITICAL = 5
-"""MAV_STATE_CRITICAL."""
+_ACTIVE, _CRITICAL = 4, 5
+"""MAV_STATE."""
 _LASTS_S, _GAP_S = 2.0, 2.5
 """One of before arming, which the first word of pilot or ground station ends, is over sooner; a link drops beats."""
 _BEFORE_S, _AFTER_S = 30.0, 3.0
@@ -22,6 +23,15 @@ _SPEAKS = re.compile(
     r"failsafe|EKF variance|low battery|battery .*is (low|critical)|lost (manual control|pilot input)", re.IGNORECASE
 )
 _OVER = re.compile(r"clear|\boff\b|\bover\b|disabled|regained", re.IGNORECASE)
+
+
+def told_to_fly(flight: Flight) -> tuple[Span, ...]:
+    """When its heartbeat said that it flies while it was armed: of a copter, what its land detector finds
+    (GCS_MAVLINK_Copter::vehicle_system_status)."""
+    beats = flight.one("STAT", "State")
+    if beats is None or not flies(flight.kind):
+        return ()
+    return tuple(lasting(beats.t, (beats["State"] == _ACTIVE) & during(flight.armed, beats.t), _LASTS_S, gap_s=_GAP_S))
 
 
 def shown_failsafes(flight: Flight) -> tuple[tuple[Span, str], ...]:

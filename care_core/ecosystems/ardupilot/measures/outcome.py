@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.heartbeat import told_to_fly
 from care_core.ecosystems.ardupilot.measures.events import (
     UNRECORDED,
     crash_of,
@@ -150,10 +151,10 @@ def _took_off(mission: Mission, *, crashed: bool) -> Value:
     flight = flight_of(mission)
     lifted = not flight.is_copter or flight.throttle is None or bool(flight.airborne)  # no height without thrust
     rose = len(heights) > 0 and bool(heights.max() > AIRBORNE_M)
-    flew = lifted and (rose or _began_aloft(mission) or _detected(mission, _TOOK_OFF))
+    flew = lifted and (rose or _began_aloft(mission) or _flew_by_itself(mission))
     if flew or crashed:
         return float(flew)
-    least_m = _BARELY_M if lifted else _HOVERS_M if _detected(mission, _TOOK_OFF) else np.inf
+    least_m = _BARELY_M if lifted else _HOVERS_M if _flew_by_itself(mission) else np.inf
     if len(heights) and heights.max() > least_m:
         return Unavailable(f"it rose no higher than {heights.max():.1f} m: too little to tell a flight by")
     return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
@@ -242,6 +243,12 @@ def _touched_down(mission: Mission) -> bool:
 def _detected(mission: Mission, events: tuple[int, ...]) -> bool:
     """Whether the land detector said so."""
     return any(mission.start_s <= t <= mission.end_s for t in flight_of(mission).events(*events))
+
+
+def _flew_by_itself(mission: Mission) -> bool:
+    """Whether its own detector said that it left the ground, by an event or in its heartbeats."""
+    beats = told_to_fly(flight_of(mission))
+    return _detected(mission, _TOOK_OFF) or any(a <= mission.end_s and b >= mission.start_s for a, b in beats)
 
 
 @extractor("mission_success", needs=NEEDS, unit="")
