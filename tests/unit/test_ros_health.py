@@ -158,6 +158,14 @@ def test_a_laser_of_which_few_scans_came_before_it_died_is_told(tmp_path: Path) 
     assert titles[0] == "the laser falls silent: /front/scan ends"
 
 
+@pytest.mark.parametrize(("times", "is_noted"), [(19, False), (20, True)])
+def test_a_warning_that_comes_again_and_again_is_noted(times: int, is_noted: bool, tmp_path: Path) -> None:
+    said = [(5.0 + n / 10, WARN, "/relay", f"Dropping message {n}: the queue is full") for n in range(times)]
+    found = looked_at(Drive(said=said), tmp_path).findings
+    told = [("/relay: Dropping message 0: the queue is full", "info")] if is_noted else []
+    assert [(one.title, one.severity) for one in found] == told
+
+
 def test_consequences_fold_under_their_cause(tmp_path: Path) -> None:
     said = [(FAILS_AT_S + 4 + n, ERROR, "planner_server", "GridBased: failed to create plan") for n in range(12)]
     health = looked_at(Drive("laser dead", ABORTED, said), tmp_path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
@@ -16,6 +16,7 @@ from care_core.text import shortened
 
 LIMITS = Limits()
 MOST = int(LIMITS.add("kinds of error that are reported", 3, "", "what fails first brings about the rest"))
+AGAIN = int(LIMITS.add("times that a warning comes", 20, "", "a choice: a node that starts warns now and then"))
 BAD = LIMITS.add("level of diagnostics", 2, "", "diagnostic_msgs/DiagnosticStatus: 2 is ERROR, 3 is STALE")
 _HARMLESS = re.compile(
     r"transition callback on a goal handle that we're not tracking|rotate recovery can't rotate", re.IGNORECASE
@@ -46,9 +47,10 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 
 def find(drive: Drive) -> Iterator[Finding]:
-    """Errors of diagnostics and of nodes."""
+    """Errors of diagnostics and of nodes, and what a node warns of again and again."""
     yield from _diagnostics(drive)
     yield from _errors(drive)
+    yield from _warnings(drive)
 
 
 def about(text: str) -> FindingKind:
@@ -100,14 +102,36 @@ def reported(report: Report) -> str:
     return f"{report.by}: {report.name}: {report.message.rstrip('. ') or 'error'}"
 
 
-def _errors(drive: Drive) -> Iterator[Finding]:
+def _kinds(messages: Iterable[LogMessage]) -> dict[tuple[str, str], list[LogMessage]]:
+    """Messages of a node that differ in numbers alone, without those that other checks read."""
     kinds: dict[tuple[str, str], list[LogMessage]] = {}
-    messages = [message for message in drive.log_messages if not _TOOL.search(message.node)]
     for message in messages:
         text = message.text
-        is_known = FAILS.search(text) or is_late(text) or _HARMLESS.search(text)
-        if message.level >= Level.ERROR and not is_known:
+        if not (FAILS.search(text) or is_late(text) or _HARMLESS.search(text)):
             kinds.setdefault((message.node, _NUMBER.sub("#", text)), []).append(message)
+    return kinds
+
+
+def _warnings(drive: Drive) -> Iterator[Finding]:
+    """A note of the warning that came most often, where it came often."""
+    warned = (one for one in drive.log_messages if one.level == Level.WARN and not _TOOL.search(one.node))
+    alike = max(_kinds(warned).values(), key=len, default=[])
+    if len(alike) >= AGAIN:
+        yield Finding(
+            kind=about(f"{alike[0].node} {alike[0].text}"),
+            title=": ".join(filter(None, (alike[0].node, gist(alike[0].text)))),
+            onset_s=alike[0].time_s,
+            end_s=alike[-1].time_s,
+            severity="info",
+            evidence=f"a warning that came {len(alike)} times",
+            source="/rosout",
+            suspect="operation",
+        )
+
+
+def _errors(drive: Drive) -> Iterator[Finding]:
+    messages = [message for message in drive.log_messages if not _TOOL.search(message.node)]
+    kinds = _kinds(message for message in messages if message.level >= Level.ERROR)
     fatal_s = max((message.time_s for message in messages if message.level >= Level.FATAL), default=None)
     ranked = sorted(
         kinds.values(), key=lambda alike: (not _MISSION_FAILED.search(alike[0].text), -alike[0].level, alike[0].time_s)
@@ -146,4 +170,4 @@ def gist(text: str, most: int = 80) -> str:
 
 
 _READS = reading(DIAGNOSTICS, FAULT_EVENT, *ROSOUT, *GOALS)
-CHECK = Check("messages", "errors of nodes and of diagnostics", _READS, LIMITS, find)
+CHECK = Check("messages", "errors of nodes and of diagnostics, warnings that come often", _READS, LIMITS, find)
