@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.findings import CUT, DROPPED, every_finding
-from tests.flights import FAILS_S, Made
+from tests.flights import FAILS_S, Made, first
 
 
 def _drop(made: Made, at_s: float) -> None:
@@ -38,6 +38,16 @@ def test_what_is_disarmed_in_the_air_and_falls_is_told(falls_s: float | None, is
     if falls_s is not None:
         _drop(made, falls_s)
     assert (DROPPED in [one.title for one in made.find()]) is is_told
+
+
+def test_who_forces_a_disarming_in_the_air_has_a_reason() -> None:
+    made = Made()
+    _drop(made, FAILS_S)
+    made.rows["ARM"][1] = (FAILS_S, {"ArmState": 0.0, "Forced": 1.0})
+    finding = first(made)
+    assert (finding.title, finding.severity) == (DROPPED, "critical")
+    assert finding.probability < 0.2
+    assert finding.evidence.endswith("somebody forced it, for what came before")
 
 
 @pytest.mark.parametrize(("pulse_us", "is_told"), [(1000.0, True), (1140.0, False)])

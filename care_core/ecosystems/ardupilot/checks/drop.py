@@ -35,24 +35,26 @@ class Drop(NamedTuple):
     title: str
     height_m: float
     fell_m: float
+    is_forced: bool
+    """Whether somebody disarmed it against all checks."""
 
 
 def drop_of(flight: Flight) -> Drop | None:
     """The first such fall; None where there was none, or no height tells."""
     if flight.height is None:
         return None
-    disarmed = [(one.time_s, DROPPED) for one in flight.arm_changes if not one.is_armed]
-    stops = sorted([*disarmed, *((t, CUT) for t in _cut(flight))])
-    drops = (_fall(flight.height, at, title) for at, title in stops)
+    disarmed = [(one.time_s, DROPPED, bool(one.is_forced)) for one in flight.arm_changes if not one.is_armed]
+    stops = sorted([*disarmed, *((t, CUT, False) for t in _cut(flight))])
+    drops = (_fall(flight.height, *stop) for stop in stops)
     return next((drop for drop in drops if drop is not None), None)
 
 
 def _cut(flight: Flight) -> Iterator[float]:
-    """When the outputs of all motors went to their least while it was armed, and stayed there: the least that they turn
-    at in the air is more."""
+    """When the outputs of all motors of a copter went to their least while it was armed, and stayed there: the least
+    that they turn at in the air is more. Wings carry a QuadPlane without them."""
     table, motors = flight.one("RCOU"), motors_of(flight.settings, flight.motor_outputs)
     columns = [f"C{motor.output}" for motor in motors]
-    if table is None or not columns or not set(columns) <= table.columns.keys():
+    if not flight.is_copter or table is None or not columns or not set(columns) <= table.columns.keys():
         return
     least = flight.setting("MOT_PWM_MIN", "Q_M_PWM_MIN") or _LEAST_US
     still = np.max([table[column] for column in columns], axis=0) <= least + _STILL_US
@@ -61,7 +63,7 @@ def _cut(flight: Flight) -> Iterator[float]:
             yield start
 
 
-def _fall(height: tuple[Floats, Floats], at: float, title: str) -> Drop | None:
+def _fall(height: tuple[Floats, Floats], at: float, title: str, is_forced: bool) -> Drop | None:
     """The fall that follows at once on motors that stop; None where none does. Where nothing told of its height for a
     while, the record that comes then tells from where it falls."""
     t, metres = height
@@ -77,7 +79,7 @@ def _fall(height: tuple[Floats, Floats], at: float, title: str) -> Drop | None:
     if np.count_nonzero(after) < _FEWEST or high_m < _DISARMED_M or sinks:
         return None
     fell_m = _largest_fall(np.append(at, t[after]), np.append(high_m, metres[after]))
-    return Drop(at, title, high_m, fell_m) if fell_m > _DROPS_M else None
+    return Drop(at, title, high_m, fell_m, is_forced) if fell_m > _DROPS_M else None
 
 
 def _largest_fall(t: Floats, height: Floats) -> float:

@@ -21,6 +21,10 @@ _OFF_US = LIMITS.add("pulse of a switch that is off", 1200.0, "us", "RC_Channel.
 _ALOFT_M = LIMITS.add("height", 1.0, "m", "a choice: lower, a landing leg may touch")
 _FALLS_S = LIMITS.add("time in which it falls", 2.0, "s", "from 1 m a free fall takes half a second")
 _FALLS_M = LIMITS.add("fall", 0.5, "m", "half of the least height; what lies keeps its height")
+_DROPPED_P = LIMITS.add("probability that it came down by that", 0.9, "", "nothing else carries it")
+_FORCED_P = LIMITS.add(
+    "the same, of what somebody forced", 0.1, "", "a choice: who cuts motors in the air has a reason"
+)
 _STOPPED, _EMERGENCY_STOP = 54, 31
 """LogEvent::MOTORS_EMERGENCY_STOPPED, and the function of a switch that stops the motors (RC_Channel.h)."""
 
@@ -42,7 +46,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence="its switch was thrown" + ("" if height_m is None else f", {height_m:.1f} m up"),
             source="EV 54; RCIN of the switch with option 31",
             suspect="operation",
-            probability=0.9,
+            probability=_DROPPED_P,
         )
     elif (fall := drop.drop_of(flight)) is not None:
         yield Finding(
@@ -51,10 +55,11 @@ def find(flight: Flight) -> Iterator[Finding]:
             onset_s=fall.time_s,
             end_s=flight.end_s,
             severity="critical",
-            evidence=f"{fall.height_m:.1f} m up, and it lost {fall.fell_m:.1f} m of that within a second or two",
+            evidence=f"{fall.height_m:.1f} m up, and it lost {fall.fell_m:.1f} m of that within a second or two"
+            + ("; somebody forced it, for what came before" if fall.is_forced else ""),
             source=f"{'ARM' if fall.title == DROPPED else 'RCOU'}; the vehicle's height",
             suspect="operation",
-            probability=0.9,
+            probability=_FORCED_P if fall.is_forced else _DROPPED_P,
         )
 
 
