@@ -64,6 +64,7 @@ def run_step(name: str, tmp_path: Path, *, logs: str, care: str = REAL, **inputs
     return Job(done.returncode, read["GITHUB_OUTPUT"], read["GITHUB_STEP_SUMMARY"], tmp_path, done.stdout + done.stderr)
 
 
+@pytest.mark.long
 def test_a_failed_run_fails_the_job_with_its_answer_in_the_summary_and_pages_kept(tmp_path: Path) -> None:
     logs = tmp_path / "my logs"
     (logs / "deep").mkdir(parents=True)

@@ -23,6 +23,8 @@ from tests.campaigns import campaign_in
 from tests.conftest import Care
 from tests.killing import JOBS
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 FLIGHT = ROOT / "tests" / "data" / "arducopter_good.BIN"
 KILLS = int(os.environ.get("CARE_KILLS", "14"))

@@ -305,6 +305,7 @@ def test_the_size_of_a_page_is_bounded(address: str, size: str) -> None:
     assert _status(address, f"/ws?{size}") == 400
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks for processes in /proc")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_sessions_end_with_the_server(tmp_path: Path, number: signal.Signals) -> None:

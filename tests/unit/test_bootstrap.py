@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from care_core.learn.bootstrap import support as measure_support
 from tests.simulated import simulate
@@ -16,6 +17,7 @@ def test_true_edges_come_again_and_chance_edges_do_not() -> None:
     assert max(false, default=0.0) <= 0.5
 
 
+@pytest.mark.long
 def test_same_seed_same_answer_whatever_the_number_of_processes() -> None:
     frame, schema, _ = simulate(80, np.random.default_rng(0), hidden=1, noise=2.0)
     one = measure_support(frame, schema, resamples=3, rng=np.random.default_rng(5), n_jobs=1)

@@ -30,6 +30,7 @@ def work(item: str) -> str:
     return item.upper()
 
 
+@pytest.mark.long
 def test_one_bad_item_never_stops_the_rest() -> None:
     items = ["a", "exit", "b", "hang", "kill", "memory", "refused", "defect", "c"]
     answers = {items[place]: answer for place, answer in each(work, items, workers=2, limit_s=LIMIT_S)}

@@ -122,6 +122,7 @@ def test_a_folder_is_no_profile_unless_somebody_named_it(tmp_path: Path, monkeyp
             installed_profile(name)
 
 
+@pytest.mark.long
 def test_a_profile_from_elsewhere_is_said_to_be_one(care: Care, tmp_path: Path) -> None:
     copy = tmp_path / "elsewhere/arducopter"
     shutil.copytree(bundled("profiles", "arducopter"), copy)
