@@ -41,7 +41,7 @@ from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, Key, NoisyOr, What
 from care_core.diagnose.parts import OUTLASTED, is_late, never_flew, set_wrong, was_refused
 from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
-from care_core.ecosystems.explains import EXPLAINS, REFUSES
+from care_core.ecosystems.explains import EXPLAINS
 from care_core.ecosystems.findings import (
     BATTERY_FAILSAFE,
     SAGS,
@@ -51,6 +51,7 @@ from care_core.ecosystems.findings import (
     SuspectKind,
     every_finding,
 )
+from care_core.ecosystems.ranking import may_refuse
 from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import replace
@@ -268,17 +269,15 @@ def _acting(findings: Sequence[Finding]) -> Iterator[Finding]:
     run by what keeps one from arming."""
     is_refused = was_refused(findings)
     for one in findings:
-        if not one.after_impact and (not is_refused or one.kind == "prearm" or _may_refuse(one, findings)):
+        if not one.after_impact and (not is_refused or one.kind == "prearm" or _kept_from_arming(one, findings)):
             yield one
 
 
-def _may_refuse(finding: Finding, findings: Sequence[Finding]) -> bool:
+def _kept_from_arming(finding: Finding, findings: Sequence[Finding]) -> bool:
     """Whether a finding may have kept the vehicle from arming: of how it was set, where the refusal speaks of that."""
-    if not _may_bring_about(finding, "prearm"):
-        return False
-    speaks = REFUSES.get(finding.kind)
-    refusals = (f"{one.title} {one.evidence}" for one in every_finding(findings) if one.kind == "prearm")
-    return not finding.parameters or speaks is None or any(map(speaks.search, refusals))
+    refusals = (one for one in every_finding(findings) if one.kind == "prearm")
+    speaks = not finding.parameters or any(may_refuse(finding, one) for one in refusals)
+    return _may_bring_about(finding, "prearm") and speaks
 
 
 def _may_bring_about(finding: Finding, *kinds: FindingKind) -> bool:

@@ -103,7 +103,7 @@ def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
         not finding.parameters  # somebody changed them
         and not any(one.severity == "info" and one.suspect in ("parameter", "operation") for one in (root, finding))
         and finding.kind in reach.get(root.kind, frozenset())
-        and _may_refuse(root, finding)
+        and may_refuse(root, finding)
         and not (root.kind == "battery" and _needs_no_pack(root, finding))
         and root.onset_s <= finding.onset_s + SLACK_S
         and root.end_s >= finding.onset_s - OVER_S
@@ -137,7 +137,7 @@ def _needs_no_pack(battery: Finding, finding: Finding) -> bool:
     return of_sensor or (battery.title == UNCHARGED and is_one_of_several)
 
 
-def _may_refuse(cause: Finding, finding: Finding) -> bool:
+def may_refuse(cause: Finding, finding: Finding) -> bool:
     """Whether a refusal to arm speaks of what a part that failed keeps it from; of anything else there is none."""
     speaks = REFUSES.get(cause.kind)
     return (

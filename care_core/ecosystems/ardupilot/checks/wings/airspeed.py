@@ -17,6 +17,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import Bools, Floats
 from care_core.text import log_time
 
 READS: Wanted = {
@@ -66,6 +67,11 @@ def find(flight: Flight) -> Iterator[Finding]:
         yield from _stall(flight)
 
 
+def _flies(flight: Flight, moved: Table, t: Floats) -> Bools:
+    """Which of these times it flies at, faster over ground than any plane taxies."""
+    return np.asarray((np.interp(t, moved.t, moved["Spd"]) > _FLIES_MS) & during(flight.flown, t))
+
+
 def _reads_nothing(flight: Flight, moved: Table | None) -> Span | None:
     """From when to when a sensor that is fitted and used reads next to nothing while the plane flies; None where it
     never does. What is none is estimated from the speed over ground and the wind, and is never so low."""
@@ -73,7 +79,7 @@ def _reads_nothing(flight: Flight, moved: Table | None) -> Span | None:
     if read is None or moved is None or not flight.setting("ARSPD_TYPE") or not flight.setting("ARSPD_USE"):
         return None
     t, airspeed = read.t, read["Airspeed" if "Airspeed" in read.columns else "As"]
-    flies = (np.interp(t, moved.t, moved["Spd"]) > _FLIES_MS) & during(flight.flown, t)
+    flies = _flies(flight, moved, t)
     spans = lasting(t, flies & (airspeed < _NOTHING_MS), _NOTHING_S)
     return (spans[0][0], spans[-1][1]) if spans and not (airspeed[flies] >= _FLIES_MS).any() else None
 
@@ -97,7 +103,7 @@ def _silent(flight: Flight, span: Span) -> Finding:
 
 def _given_up(flight: Flight, sensor: Table, moved: Table) -> Iterator[Finding]:
     t, read = sensor.t, sensor["Airspeed"]
-    flies = (np.interp(t, moved.t, moved["Spd"]) > _FLIES_MS) & during(flight.flown, t)
+    flies = _flies(flight, moved, t)
     if flies.sum() < 10 or not (read[flies] > 0).any():
         return
     out = np.zeros(len(t), dtype=bool)
