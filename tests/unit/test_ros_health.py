@@ -16,11 +16,11 @@ from care_core.ecosystems.findings import Health, every_finding
 from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros import ECOSYSTEM
 from care_core.ecosystems.ros.checks import imu as felt
-from care_core.ecosystems.ros.checks import messages, odometry
+from care_core.ecosystems.ros.checks import messages, odometry, timing
 from care_core.ecosystems.ros.checks.messages import gist, reported
 from care_core.ecosystems.ros.messages import IMU, MESSAGES
 from care_core.ecosystems.ros.motion import odometry_of
-from care_core.ecosystems.ros.node_messages import Report
+from care_core.ecosystems.ros.node_messages import LogMessage, Report
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
@@ -40,7 +40,7 @@ from tests.ros_samples import (
 )
 from tests.whole import one_in
 
-WARN, ERROR, FATAL = 30, 40, 50
+INFO, WARN, ERROR, FATAL = 20, 30, 40, 50
 
 
 def looked_at(drive: Drive, tmp_path: Path) -> Health:
@@ -209,6 +209,20 @@ def test_a_control_loop_at_a_tenth_of_its_rate_is_a_finding(tmp_path: Path, text
     findings = looked_at(Drive(outcome=ABORTED, said=said), tmp_path).findings
     serious = [one.title for one in findings if one.severity != "info"]
     assert serious == ([title] if title else [])
+
+
+@pytest.mark.parametrize(("said", "found"), [([], 1), ([LogMessage(1.0, INFO, "/move_base", "Got new plan")], 0)])
+def test_seldom_commands_tell_of_a_slow_loop_where_no_node_is_heard(said: list[LogMessage], found: int) -> None:
+    """A loop that is late says so: where nodes are heard and none of them does, it is the recording that is thin."""
+    drive = SimpleNamespace(
+        log_messages=said,
+        commands=SimpleNamespace(t=np.arange(0.0, 60.0, 2.0), topic="/cmd_vel"),
+        settings={"/move_base/controller_frequency": (SimpleNamespace(value=5.0),)},
+        goals=(SimpleNamespace(sent_s=0.0, end_s=60.0),),
+        severity=lambda at: "critical",
+    )
+    told = [one.title for one in timing._slow_control(cast(Any, drive))]
+    assert told == ["the control loop runs at 0.5 Hz, its rate is 5 Hz"] * found
 
 
 def test_a_loop_is_slow_where_it_misses_its_rate_for_long(tmp_path: Path) -> None:
@@ -944,7 +958,7 @@ def test_an_acceleration_in_g_is_told(rest: tuple[float, float, float], *, is_in
     for axis, level in zip("xyz", rest, strict=True):
         columns[f"linear_acceleration.{axis}"] = level + rng.normal(0.0, 0.3, len(t))
     drive = SimpleNamespace(of=lambda _type: [("/imu", Table(t, columns))], duration_s=20.0, odometry=None)
-    assert [one.title for one in felt.find(cast("Any", drive))] == (
+    assert [one.title for one in felt.find(cast(Any, drive))] == (
         ["the IMU tells its acceleration in g, not in m/s^2"] if is_in_g else []
     )
 

@@ -93,7 +93,8 @@ def _evidence(complaints: list[LogMessage]) -> str:
 
 
 def _slow_control(drive: Drive) -> Iterator[Finding]:
-    """A control loop at a fraction of its rate, by its own word; else by how seldom commands come while it drives."""
+    """A control loop at a fraction of its rate, by its own word; where no node's words are recorded, by how seldom
+    commands come while it drives: a loop that is late says so, and a recording may hold one command in ten."""
     rates = [
         (one.time_s, now, wanted)
         for one in drive.log_messages
@@ -106,7 +107,7 @@ def _slow_control(drive: Drive) -> Iterator[Finding]:
         yield _slow(drive, slow[0][0], slow[-1][0], now, wanted, f"{counted(len(slow), 'message')} of its own")
         return
     setting = next((held[0] for name, held in drive.settings.items() if name.endswith("controller_frequency")), None)
-    if rates or drive.commands is None or setting is None or not isinstance(setting.value, (int, float)):
+    if drive.log_messages or drive.commands is None or setting is None or not isinstance(setting.value, (int, float)):
         return
     t, goals = drive.commands.t, [(goal.sent_s, goal.end_s) for goal in drive.goals]
     steps = np.concatenate([np.empty(0), *(np.diff(t[(t >= start) & (t <= end)]) for start, end in goals)])
