@@ -107,3 +107,16 @@ def test_disarming_itself_is_no_landing(landed_s: float, landed: float) -> None:
     detected = states(landed=[(0, 1), (12, 0), (landed_s, 1)])
     found = checked(vehicle_land_detected=detected, vehicle_local_position=heights(3.0))
     assert found["landed"] == (landed, "it was disarmed in the air")
+
+
+@pytest.mark.parametrize(("up_m", "told"), [(5.0, "it came down and could not rise again"), (0.0, "too little thrust")])
+def test_all_the_thrust_on_the_ground_after_a_flight_is_no_lack_of_it(up_m: float, told: str) -> None:
+    """What lies there came down for another reason; what never left the ground is too heavy or has no thrust."""
+    log = MadeLog({
+        "vehicle_status": FLOWN,
+        "vehicle_local_position": states(z=[(0, 0.0), (12, -up_m), (18, -up_m), (20, 0.0)], vz=[(0, 0.0)]),
+        "vehicle_local_position_setpoint": states(vz=[(0, 0.0), (22, -3.0)]),
+        "vehicle_thrust_setpoint": states(**{"xyz[2]": [(0, -0.5), (22, -1.0)]}),
+    })  # fmt: skip
+    findings = every_finding(examine(Px4Flight(log)).findings)
+    assert [one.title for one in findings if one.kind == "thrust" or "rise" in one.title] == [told]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import UNPOWERED, Finding
+from care_core.ecosystems.findings import CAME_DOWN, UNPOWERED, Finding
 from care_core.ecosystems.px4.flight import POSITION, Px4Flight
 from care_core.ecosystems.spans import Span, during, runs, within
 from care_core.ecosystems.vehicles import way_of
@@ -55,6 +55,8 @@ _FEWEST = 10
 _UNPOWERED_P = LIMITS.add("probability that the motors get no power", 0.95, "", "physics: lift takes power")
 _SET_P = LIMITS.add("probability of an end that is set", 0.9, "", "thrust stands at the very value that somebody set")
 _SET_BY = LIMITS.add("how far an end is set off its default", 0.1, "", "a choice: a tenth of the thrust is felt")
+_LIES_MS = LIMITS.add("speed of what lies on the ground", 0.1, "m/s", "a choice: the estimator still drifts")
+_STRANDED_P = LIMITS.add("probability that a part broke, on the ground again", 0.1, "", "a choice: it says hardly why")
 _TRUE_P = LIMITS.add("probability of a part", 0.5, "", "a choice: a load, and how outputs are set, look the same")
 
 
@@ -77,7 +79,9 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     most, least = flight.parameter("MPC_THR_MAX") or 1.0, flight.parameter("MPC_THR_MIN") or _LEAST
     lacks = (lift > min(_ALL, most - _NEAR_LEAST)) & (sinks - wanted > _OFF_MS) & (wanted < 0.0)
     flies_off = (lift < least + _NEAR_LEAST) & (wanted - sinks > _OFF_MS) & (sinks < -_RISES_MS)
-    lacking = list(_at_its_end(flight, _End(t, lacks, sinks, wanted), "too little thrust", "all the thrust"))
+    all_of_it = _End(t, lacks, sinks, wanted)
+    yield from _came_down(flight, all_of_it)
+    lacking = list(_at_its_end(flight, all_of_it, "too little thrust", "all the thrust"))
     drawn_w = drawn_while_lifting(flight)
     if drawn_w is not None:
         yield from _unpowered(flight, lacking or _lifts(flight, t, lift), drawn_w)
@@ -154,9 +158,29 @@ def _unpowered(flight: Px4Flight, lacking: Iterable[Finding], drawn_w: float) ->
         )
 
 
-def _at_its_end(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator[Finding]:
+def _came_down(flight: Px4Flight, end: _End) -> Iterator[Finding]:
+    """All the thrust, and it lies where it came down: what brought it there is what went wrong."""
+    span = next((span for span in _lasting(flight, end) if _lies(flight, end, span)), None)
+    if span is not None:
+        what = f"all the thrust for {span[1] - span[0]:.0f} s on the ground, below the height that it is told to reach"
+        stranded = _finding(CAME_DOWN, span, what)
+        yield replace(stranded, kind="crash", severity="critical", probability=_STRANDED_P)
+
+
+def _lies(flight: Px4Flight, end: _End, span: Span) -> bool:
+    """Whether it had flown, is low again, and neither rises nor sinks."""
+    speeds = np.abs(end.sinks[(end.t >= span[0]) & (end.t <= span[1])])
+    was_up = any(up[1] <= span[0] for up in flight.aloft) and not any(up[0] < span[1] < up[1] for up in flight.aloft)
+    return was_up and quantile(speeds, _FOR_A_WHILE) < _LIES_MS
+
+
+def _lasting(flight: Px4Flight, end: _End) -> list[Span]:
     spans = [span for span in runs(end.t, end.holds) if span[1] - span[0] >= _LASTS_S]
-    flown = [span for span in spans if _is_flown(flight, span) and _is_heard(flight, span)]
+    return [span for span in spans if _is_flown(flight, span) and _is_heard(flight, span)]
+
+
+def _at_its_end(flight: Px4Flight, end: _End, title: str, what: str) -> Iterator[Finding]:
+    flown = [span for span in _lasting(flight, end) if not _lies(flight, end, span)]
     if flown:
         start, stop = flown[0]
         during = (end.t >= start) & (end.t <= stop)
