@@ -116,11 +116,11 @@ class DiffPage(ProvenPage):
         return (cause for cause in causes if cause.option.name in changed)
 
     def beside(self) -> tuple[str, list[Row]]:
-        fix, diagnosis = self.session.fix, self.session.diagnosis
+        fix = self.session.fix
         if fix is None or not fix.changes or not self.has_content:
             return "", []
         cautions = [warning("Caution", caution) for caution in self._cautions(fix)]
-        return "About the change", [*cautions, *about_rows(fix, diagnosis, self.glyphs)]
+        return "About the change", [*cautions, *about_rows(fix, self.session.diagnosis, self.glyphs)]
 
     @property
     def _text(self) -> str:

@@ -74,7 +74,7 @@ def objective_detail(result: ObjectiveResult, summary: Summary | None, glyphs: G
         return rows
     if summary is None:
         return [*rows, labelled("Distribution", "the profile holds none for this objective")]
-    rows.append(labelled("", _strip(result, summary, glyphs, min(STRIP_WIDTH, room - LABEL_WIDTH))))
+    rows.append(labelled("", _strip(result, summary, glyphs, max(1, min(STRIP_WIDTH, room - LABEL_WIDTH)))))
     below = percent(summary.percentile(result.value))
     middle = measure(summary.quantiles[len(summary.quantiles) // 2], variable.unit)
     rows.append(labelled("Distribution", f"{below} of {summary.count} training runs are lower; the middle is {middle}"))

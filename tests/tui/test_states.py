@@ -14,6 +14,7 @@ from care_core.errors import CareError, ExitCode, LogError, ProfileError
 from care_core.progress import Progress
 from care_core.records import replace
 from care_tui.app import CareApp
+from care_tui.page_names import STEPS, VIEWS
 from care_tui.places import as_path, entries, found_logs, recent_logs, remember
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.settings import Settings
@@ -59,6 +60,18 @@ async def test_loading_shows_step_and_share_done_on_every_step() -> None:
         await settle(pilot)
         assert step_of(app) == 6, "the operator is left where they are"
         assert text(app).startswith("report: yaml")
+
+
+async def test_every_page_can_be_looked_at_while_a_log_is_read() -> None:
+    for page in (*STEPS, *VIEWS):
+        app, slow = slow_app()
+        async with app.run_test(size=(120, 40)) as pilot:
+            slow.reached.wait(5)
+            await pilot.press(page.key)
+            await pilot.pause()
+            slow.go_on.set()
+            await settle(pilot)
+            assert walk(app).session.state == "data", page.name
 
 
 async def test_escape_stops_work_that_never_reports_and_r_starts_again() -> None:

@@ -206,6 +206,13 @@ def test_the_ruler_of_an_objective_is_one_line(room: int) -> None:
     assert ruler.content.cell_length <= room
 
 
+def test_an_objective_is_told_where_there_is_no_room_yet() -> None:
+    """A pane that is not laid out has no width."""
+    summary = Summary(count=500, mean=150.0, sd=30.0, quantiles=(100.0, 200.0))
+    rows = objective_detail(sample.SLOW, summary, UNICODE, 9)
+    assert any(row.content.plain.startswith("Distribution") for row in rows)
+
+
 def test_a_label_that_is_wider_than_its_column_does_not_run_into_its_text() -> None:
     assert labelled("It led to", "a crash").content.plain == "It led to     a crash"
     assert labelled("Seen just before it", "no path").content.plain == "Seen just before it: no path"
