@@ -175,7 +175,7 @@ NO_PROFILE_FOR = "no profile is for "
 
 
 class Fit(Record):
-    """How well a profile fits a log: "partly" caps every confidence at low, with "no" nothing is advised."""
+    """How well a profile fits a log: "partly" caps every confidence at low, with "no" nothing that training says is told."""
 
     verdict: FitVerdict
     reasons: tuple[str, ...] = ()
@@ -257,6 +257,11 @@ class Run(Record):
     def noun(self) -> str:
         """What to call it: a mission, or a run that was no mission or is judged without one."""
         return "run" if self.checks else "mission"
+
+    def left_at(self, parameter: str) -> Setting | None:
+        """What a parameter was at last: where it was changed on the way, that is what has to go back."""
+        history = self.changes.get(parameter)
+        return history[-1] if history else self.settings.get(parameter)
 
     def value(self, name: str) -> Value | None:
         """The run's value of a variable of any role, None when the run does not hold it."""

@@ -143,7 +143,7 @@ class Session(Struct, eq=False):
             return ()
         diagnosis = self.diagnosis
         is_judged, can_change = bool(diagnosis.objectives), diagnosis.profile.fit.verdict != "no"
-        can_change = can_change and not diagnosis.run.checks
+        can_change = (can_change and not diagnosis.run.checks) or diagnosis.fix is not None
         empty = () if is_judged else ("objectives",)
         if not diagnosis.hypotheses and not can_change:
             empty = (*empty, "causes")
@@ -220,7 +220,7 @@ class Session(Struct, eq=False):
     def current(self, option: Variable) -> float | None:
         """The option's value in this run; where no source holds it, what the engine took it to be."""
         run, reference = self.diagnosis.run, self._reference()
-        if option.name not in reference and (setting := run.settings.get(option.name)) is not None:
+        if option.name not in reference and (setting := run.left_at(option.name)) is not None:
             return as_number(setting.value)
         return run.config.get(option.name, reference.get(option.name, option.default))
 

@@ -61,7 +61,6 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     failed part or what the run met explains is taken off, as for the suggestion."""
     from care_core.diagnose.records import Fix
 
-    question = question_of(case)
     advised, options = case.diagnosis.fix, {option.name for option in case.options}
     if advised is not None and dict(changes) == changes_of(advised) and (advised.shown_by or changes.keys() - options):
         return advised
@@ -71,7 +70,7 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
             f"What {', '.join(strange)} does {where} is not known: no profile models it.",
             hint="Take the suggestion (s), or untick it.",
         )
-    answer = question.ask(changes)
+    answer = question_of(case).ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
     by_hand = bool(changes) and all(changes_of(one) != changes for one in fixes(case.diagnosis))
     return Fix(answer.changes, answer.p_ok, predicted, by_hand=by_hand)

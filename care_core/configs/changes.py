@@ -23,11 +23,12 @@ def unified_diff(run: Run, changes: Sequence[Change], *, by_hand: bool = False) 
     driven, fixed = {}, {}
     for option, parameter, suggested in _assignments(changes):
         change = next(change for change in changes if change.option is option)
-        setting = run.settings.get(parameter)
-        current = None if setting is None else option_value(option, setting)
-        was = change.current if current is None else current
-        if not (change.is_assumed and current is None):
-            driven[parameter] = line_of(option, parameter, parameter_value(option, was))
+        current: float | None = change.current
+        if change.is_assumed:
+            setting = run.settings.get(parameter)
+            current = None if setting is None else option_value(option, setting)
+        if current is not None:
+            driven[parameter] = line_of(option, parameter, parameter_value(option, current))
         fixed[parameter] = line_of(option, parameter, suggested)
     lines = difflib.unified_diff(
         [driven[parameter] for parameter in sorted(driven)],

@@ -160,7 +160,7 @@ def _within_limits(
         health.findings, missed=missed, shown=said, verdict=choice.fit.verdict, outside=weights
     )
     lead = leading_outside(told, outside, health.findings, run)
-    fix = shown_fix(lead, run) or shown_back(judged, schema, told, said, health.findings)
+    fix = shown_fix(lead, run, health.findings) or shown_back(judged, schema, told, said, health.findings)
     return Diagnosis(
         choice,
         run,
@@ -229,15 +229,16 @@ def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Di
     outside = suspects_outside(judged.run, broken, health) if _failed(broken, health) else ()
     told = hypotheses_without_model(health.findings, missed=broken, outside=_weights(outside))
     lead = leading_outside(told, outside, health.findings, judged.run)
+    fix = shown_fix(lead, judged.run, health.findings)
     return Diagnosis(
         choice,
         judged.run,
         judged.checks,
         tuple(Fault(result, ()) for result in broken),
-        None,
+        fix,
         missions=judged.missions,
         health=health,
-        abstained=None if lead is None else check_first(lead),
+        abstained=None if lead is None or fix is not None else check_first(lead),
         hypotheses=told,
         outside=outside,
     )

@@ -126,4 +126,5 @@ def _finding(
         suspect="parameter",
         probability=_PROBABILITY_P,
         parameters=tuple(names),
+        wanted=tuple((one.name, float(one.before)) for one in several if isinstance(one.before, (int, float))),
     )

@@ -156,7 +156,7 @@ class CausesPage(ProvenPage):
         if self.session.diagnosis.hypotheses and not self._has_causes:
             unfit = self.session.diagnosis.profile.fit.verdict == "no"
             why = "no profile fits" if unfit else "no mission was flown" if self.session.diagnosis.run.checks else ""
-            return Content("What explains it" + (f"; {why}, so no parameter is judged" if why else ""))
+            return Content("What explains it" + (f"; {why}: by what the log shows alone" if why else ""))
         if result is None:
             return Content("No objective")
         title = Content(f"Causes of {clean(result.variable.name)}{self._alike(fault)}")

@@ -118,7 +118,7 @@ async def test_where_no_profile_fits_what_explains_a_failure_is_ranked_all_the_s
     app = make_app(replace(sample.unfitting(), hypotheses=weighed))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
-        assert "no parameter is judged" in title(app)
+        assert "by what the log shows alone" in title(app)
         assert items(app).splitlines()[0].split()[:2] == ["80", "%"]
         assert "motor 2 lost thrust" in items(app).splitlines()[0]
         assert "output 1950 us" in text(app)

@@ -26,7 +26,7 @@ from care_core.diagnose.outside.signs import Signs, signs_of
 from care_core.diagnose.outside.suspects import outside_suspects, phases_of
 from care_core.diagnose.records import Hypothesis, ObjectiveResult, OutsideSuspect, first_named
 from care_core.diagnose.verdict import verdict_of
-from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding, Health
+from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding, FindingKind, Health
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import CareError, ConfigError
 from care_core.metadata.causal_map import FROM_FLIGHTS, OF_THIS_VEHICLE
@@ -377,12 +377,36 @@ def test_what_the_log_shows_is_changed_without_odds_where_no_objective_could_be_
     )
     run = made_run()
     rover = replace(run, log=replace(run.log, facts=ROVER))
-    fix = shown_fix(lead, rover)
+    found = [ended("SERVO3_MAX", 2000.0)]
+    fix = shown_fix(lead, rover, found)
     assert fix is not None
     assert [(one.option.name, one.suggested) for one in fix.changes] == [("SERVO3_MAX", 2000.0)]
     assert fix.odds is None
     for other in (None, replace(lead, is_found=False), replace(lead, is_advised=False)):
-        assert shown_fix(other, rover) is None
+        assert shown_fix(other, rover, found) is None
+
+
+def ended(name: str, wanted: float, kind: FindingKind = "tuning") -> Finding:
+    return Finding(kind, f"{name} ends", 0.0, 9.0, "critical", "", "RCOU", parameters=(name,), wanted=((name, wanted),))
+
+
+def test_what_was_set_wrong_in_the_same_way_goes_back_with_it_from_where_it_was_left() -> None:
+    """Of two motors that were switched off in flight both are switched on again, though the run began with them on."""
+    on, off = Setting("SERVO2_FUNCTION", 34, "log"), Setting("SERVO2_FUNCTION", 1, "log", changed_at_s=17.0)
+    named = ("SERVO2_FUNCTION", "SERVO4_FUNCTION", "SERVO3_MAX")
+    run = replace(
+        made_run(),
+        settings={name: replace(on, name=name) for name in named},
+        changes={name: (replace(on, name=name), replace(off, name=name)) for name in named[:2]},
+    )
+    lead = Advisable(named[0], 1.0, 34.0, "", 0.8, "it was changed in flight", is_found=True, is_advised=True)
+    found = [ended(named[0], 34.0), ended(named[1], 36.0), ended(named[2], 2000.0, "battery")]
+    fix = shown_fix(lead, run, found)
+    assert fix is not None
+    assert [(one.option.name, one.current, one.suggested) for one in fix.changes] == [
+        ("SERVO2_FUNCTION", 1.0, 34.0),
+        ("SERVO4_FUNCTION", 1.0, 36.0),
+    ]
 
 
 def test_a_value_on_the_side_that_nobody_flew_counts_by_how_far_it_is_off() -> None:

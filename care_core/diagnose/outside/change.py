@@ -51,7 +51,7 @@ def leading_outside(
     first = first_named(hypotheses)
     if first is None or first.what != "parameter" or first.name in run.config:
         return None
-    setting, meaning = run.settings.get(first.name), meaning_of(first.name, vehicle_of_run(run).kind)
+    setting, meaning = run.left_at(first.name), meaning_of(first.name, vehicle_of_run(run).kind)
     if setting is None or not isinstance(setting.value, (int, float)):
         return None
     suspect = next((one for one in suspects if one.name == first.name), None)
@@ -102,11 +102,11 @@ def asked_beside(findings: Sequence[Finding], run: Run, known: Collection[str]) 
     how the vehicle is built, is left to its operator."""
     asked = {name: value for name, value in asked_by_findings(findings).items() if name not in known}
     kind = vehicle_of_run(run).kind
-    told = {name: run.settings[name].value for name in asked if name in run.settings and not _is_kept(name, kind)}
+    left = {name: run.left_at(name) for name in asked if not _is_kept(name, kind)}
     return tuple(
-        _change(name, float(value), asked[name], run)
-        for name, value in told.items()
-        if isinstance(value, (int, float)) and value != asked[name]
+        _change(name, float(setting.value), asked[name], run)
+        for name, setting in left.items()
+        if setting is not None and isinstance(setting.value, (int, float)) and setting.value != asked[name]
     )
 
 
@@ -123,12 +123,15 @@ def _is_kept(name: str, kind: Kind) -> bool:
     return not mended(name) if meaning is None else meaning.role == "safety" or meaning.part == BUILT_AS
 
 
-def shown_fix(lead: Advisable | None, run: Run) -> Fix | None:
-    """The change that the log itself shows, where no objective could be judged and nothing has odds; None where it
-    shows none."""
+def shown_fix(lead: Advisable | None, run: Run, findings: Sequence[Finding]) -> Fix | None:
+    """The change that the log itself shows, where no objective could be judged and nothing has odds, with what else was
+    set wrong in the same way; None where it shows none."""
     if lead is None or not lead.is_advised or not lead.is_found:
         return None
-    return replace(outside_fix(lead, lead.probability, run), shown_by=lead.why)
+    kind = next(one.kind for one in every_finding(findings) if lead.name in one.parameters)
+    alike = [one for one in every_finding(findings) if one.kind == kind and not one.after_impact]
+    fix = outside_fix(lead, lead.probability, run, asked_beside(alike, run, {lead.name}))
+    return replace(fix, shown_by=lead.why)
 
 
 def outside_option(name: str, default: float | None, vehicle: Vehicle) -> Variable:
