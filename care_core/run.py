@@ -175,7 +175,7 @@ NO_PROFILE_FOR = "no profile is for "
 
 
 class Fit(Record):
-    """How well a profile fits a log: "partly" caps every confidence at low, with "no" nothing that training says is told."""
+    """How well a profile fits a log: "partly" caps every confidence at low, with "no" training tells nothing."""
 
     verdict: FitVerdict
     reasons: tuple[str, ...] = ()

@@ -150,8 +150,9 @@ def _differs(value: float | str, driven: float) -> bool:
 
 def _not_driven(setting: Setting, wanted: Wanted) -> str:
     """A robot that does not drive with what its file says will not do so after a change of the file either."""
-    has = "this already" if same_value(setting.value, wanted.value) else shown(setting.value)
-    return f"the file has {has} but the robot ran {shown(wanted.driven)}: this is not the file it used"
+    if same_value(setting.value, wanted.value):
+        return f"the file has this already, and the robot ran {shown(wanted.driven)}: changed since, or another file"
+    return f"the file has {shown(setting.value)} but the robot ran {shown(wanted.driven)}: this is not the file it used"
 
 
 def _is_same(file: EditedFile, one: Setting, other: Setting) -> bool:

@@ -273,8 +273,12 @@ def meaningful(
 ) -> dict[str, Value]:
     """The run's objectives, those withheld whose value means nothing for its mission."""
     if not run.mission.ended:
-        cut = Unavailable("the log ends before the mission does", "record until the mission has ended")
-        return {name: cut if is_known(value) else value for name, value in run.objectives.items()}
+        mend = "the file is damaged: copy it again" if run.log.damage else "record until the mission has ended"
+        cut = Unavailable("the log ends before the mission does", mend)
+        return {
+            name: value if isinstance(value, Unavailable) and value.reason != cut.reason else cut
+            for name, value in run.objectives.items()
+        }
     missed = _not_accomplished(run, schema, bounds)
     found = dict(run.objectives)
     for objective in schema.objectives:

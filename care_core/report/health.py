@@ -69,13 +69,16 @@ def telling(account: Sequence[E], most: int, findings: Sequence[Finding | Findin
     return [account[at] for at in sorted(sorted(range(len(account)), key=weight)[:most])]
 
 
-def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
+def finding_lines(
+    findings: Sequence[Finding | FindingEntry], account: Sequence[Event | EventEntry] = ()
+) -> Iterator[str]:
     """The findings as text, what belongs to another under it; that nothing was found is said plainly."""
     shown = noted(findings)
     if any(one.title != NO_TASK for one in findings) and not shown:
         return
     if not shown:
-        yield "Findings: no health problems found in what this log records"
+        told = "; the errors that it reported stand below" if any(one.kind == "error" for one in account) else ""
+        yield from wrapped(f"no health problems found in what this log records{told}", "Findings: ", "  ")
         return
     yield "Findings" if len(shown) == 1 else "Findings, the first cause first"
     for finding in shown:

@@ -248,7 +248,7 @@ def _missed(missed: Missed) -> MissedEntry:
 def inspection_text(document: InspectDocument) -> str:
     """Lines for a terminal."""
     fitting = next((profile.name for profile in document.profiles if profile.usable), "")
-    findings = list(finding_lines(document.findings))
+    findings = list(finding_lines(document.findings, document.account))
     lines = [
         *wrapped(fit_text("" if document.fit.verdict == "no" else fitting, document.fit)),
         *(["", *findings] if findings else []),

@@ -33,7 +33,7 @@ def to_text(diagnosis: Diagnosis) -> str:
     sections = [
         _verdict(verdict),
         reason_lines(verdict.reasons),
-        finding_lines(health.findings) if health.timeline or health.findings else (),
+        finding_lines(health.findings, health.timeline) if health.timeline or health.findings else (),
         timeline_lines(health.timeline, health.findings, health.robot),
         _origin(diagnosis),
         _missions(diagnosis),

@@ -7,6 +7,7 @@ from typing import ClassVar
 from textual.binding import Binding
 from textual.content import Content
 
+from care_core.errors import LogError
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.page_names import NAMES, PAGES
@@ -87,4 +88,5 @@ def failure_rows(session: Session) -> Rows:
     if session.error is None:
         return Rows([])
     rows = error_rows(session.error).rows
-    return Rows([*rows, labelled("", "v shows what the log holds")] if session.is_readable else rows)
+    holds = session.is_readable and not isinstance(session.error, LogError)  # of what cannot be read v knows no more
+    return Rows([*rows, labelled("", "v shows what the log holds")] if holds else rows)

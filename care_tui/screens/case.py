@@ -203,6 +203,8 @@ class CaseScreen(Screen[None]):
         needs, session = PAGES[name].needs, self.session
         if needs == "nothing" or name in NAMES or session.case is not None:
             return ""
+        if session.state == "loading":
+            return "The log is still being read."
         if not session.is_readable:
             return "Open a log first: L leads to them."
         return "" if needs == "log" else "This log has no diagnosis; v shows what it holds."

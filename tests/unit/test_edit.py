@@ -74,7 +74,7 @@ def test_a_vehicle_parameter_keeps_its_line(tmp_path: Path, line: str) -> None:
 @pytest.mark.parametrize(
     ("held", "driven", "says"),
     [
-        ("5", 9.757, "has this already but the robot ran 9.757"),
+        ("5", 9.757, "has this already, and the robot ran 9.757"),
         ("7", 9.757, "has 7 but the robot ran 9.757"),
         ("9.75712", 9.757, ""),
         ("7", None, ""),
