@@ -32,6 +32,9 @@ def near(name: str, known: Iterable[str]) -> str:
 def check(file: LintedFile) -> Iterator[Problem]:
     """What is wrong with a file whatever it configures."""
     first: dict[tuple[str, ...], Entry] = {}
+    if all(not line.strip() or line.lstrip().startswith("#") for line in file.text.splitlines()):
+        nothing = Entry((), "", 1, 1)
+        yield file.warning("empty", nothing, "The file holds no parameter.", "Copy it from the robot again.")
     for entry in file.entries:
         keys = tuple(part for key in entry.keys for part in key.split("."))
         earlier = first.get(keys)

@@ -16,6 +16,7 @@ class Rule(NamedTuple):
 _TABLES = "the sources of each release, as tables"
 RULES: tuple[Rule, ...] = (
     Rule("syntax", "A line that the reader of the format refuses.", "the format: YAML, NAME VALUE, or five columns"),
+    Rule("empty", "A file without any parameter.", "whoever loads it runs on its defaults"),
     Rule("no-parameters", "Values of Nav2's nodes where ROS 2 reads none.", "ROS 2 reads below ros__parameters"),
     Rule("duplicate", "The same parameter twice in one file.", "how the readers of the format work"),
     Rule("unknown-key", "A name that nothing reads in any release.", _TABLES),

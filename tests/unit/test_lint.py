@@ -214,11 +214,15 @@ def test_a_line_that_cannot_be_read_is_a_finding_and_the_rest_is_still_read(tmp_
         "amcl:\n  ros__parameters:\n    use_sim_time: $(var sim)\n    scan_topic: scan\n",
         "bt_navigator:\n  ros__parameters:\n    what_my_plugin_reads: 3\n",
         "costmap_common: {}\n",
-        "",
     ],
 )
 def test_what_nobody_knows_is_let_be(tmp_path: Path, text: str) -> None:
     assert told(tmp_path, "a.yaml", text) == []
+
+
+@pytest.mark.parametrize(("name", "text"), [("a.yaml", ""), ("a.param", "# saved\n\n")])
+def test_a_file_without_a_parameter_is_a_fault(tmp_path: Path, name: str, text: str) -> None:
+    assert told(tmp_path, name, text) == [(1, "empty", "warning")]
 
 
 def test_the_profile_adds_its_own_range(tmp_path: Path, care: Care) -> None:
