@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 from care_core.ecosystems.findings import (
     CAME_DOWN,
+    LOST_SIGHT,
     NO_MISSION,
     NO_POSITION_FOR,
     NOT_BEGUN,
@@ -93,6 +94,11 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
     (r"(.*) no longer obeys?", r"look at \1: a servo that stuck, its gears and supply, linkage, horn and hinges"),
     ("the plane stalled", "look at what made it so slow: its lowest airspeed, its weight, its thrust"),
     (r"\w+ turns against its motors", "check the motors' order and directions with the motor test, and the propellers"),
+    (
+        LOST_SIGHT,
+        "look for it where it was last (the map shows where); its own log, on its memory card, tells whether its link or "
+        "its power was lost",
+    ),
     (
         rf"power was lost|the log ends in the air|{re.escape(OWN_SUPPLY)}",
         "check the battery's connector, the power module and the autopilot's 5 V supply under load",

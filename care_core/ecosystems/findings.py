@@ -164,6 +164,7 @@ MONITOR_SILENT = "the battery monitor fell silent"
 OF_MONITOR = NO_BATTERY, MONITOR_SILENT
 """What titles begin with that speak of the monitor of a battery, and of no pack."""
 CAME_DOWN = "it came down and could not rise again"
+LOST_SIGHT = "the vehicle is heard no more, in the air"
 
 
 class OfRun(Record):

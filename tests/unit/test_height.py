@@ -68,6 +68,14 @@ def test_a_climb_rate_that_the_barometer_contradicts(off_ms: float, mode: float,
     assert ("the estimated climb rate runs away from the barometer's" in [one.title for one in made.find()]) is is_told
 
 
+def test_one_damaged_value_is_no_climb() -> None:
+    made = Made()
+    made.rows["MODE"] = [(0.0, {"ModeNum": 5.0})]
+    made.table["CTUN"]["CRt"] = 100.0 * np.gradient(made.table["CTUN"]["Alt"], made.t)
+    made.table["CTUN"]["CRt"][int(np.flatnonzero(made.t > 45.0)[0])] = 17563.0
+    assert "the estimated climb rate runs away from the barometer's" not in [one.title for one in made.find()]
+
+
 def test_accelerometers_that_do_not_feel_gravity_bring_it_about() -> None:
     made = Made()
     made.table["CTUN"]["CRt"] = 100.0 * np.gradient(made.table["CTUN"]["Alt"], made.t)

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from care_core.ecosystems.examine import examine
+from care_core.ecosystems.findings import LOST_SIGHT, every_finding
 from care_core.ecosystems.registry import run_model
 from care_core.extract.coverage import cover
 from care_core.extract.read import read_run
@@ -15,7 +17,7 @@ from care_core.logs.telemetry import as_dataflash
 from care_core.profile.reading import read_schema
 from care_core.profile.schema import Schema
 from care_core.run import Run, Unavailable, is_known
-from tests.groundstation import write_tlog
+from tests.groundstation import VEHICLE, write_tlog
 from tests.rewritten import write_text
 
 ROOT = Path(__file__).parents[2]
@@ -86,3 +88,28 @@ def test_a_text_log_gives_the_same_run(recorded: Run, schema: Schema, tmp_path: 
         for name, value in own.items():
             other = values[name]
             assert other == (pytest.approx(value, rel=1e-6, abs=1e-5) if is_known(value) else value), name
+
+
+def until(path: Path, last_s: float) -> Path:
+    """The same telemetry, in which the vehicle is heard no more from a time on, while its station records on."""
+    raw, kept, at, first = path.read_bytes(), [], 0, None
+    while at < len(raw):
+        stamp, magic = int.from_bytes(raw[at : at + 8], "big"), raw[at + 8]
+        first = stamp if first is None else first
+        size = 8 + raw[at + 9] + (12 if magic == 0xFD else 8)
+        system = raw[at + 8 + (5 if magic == 0xFD else 3)]
+        if system != VEHICLE[0] or stamp - first < last_s * 1e6:
+            kept.append(raw[at : at + size])
+        at += size
+    path.write_bytes(b"".join(kept))
+    return path
+
+
+def test_a_vehicle_that_is_heard_no_more_in_the_air_is_told_and_its_flight_ends_there(tmp_path: Path) -> None:
+    path = until(write_tlog(tmp_path / "a.tlog", SAMPLE, np.random.default_rng(0)), 90.0)
+    model = run_model(open_log(path))
+    health = examine(model)
+    assert LOST_SIGHT in [one.title for one in every_finding(health.findings)]
+    assert [one.text for one in health.timeline if one.time_s > 85.0 and "heard no more" in one.text]
+    assert model.log.duration_s > 150.0
+    assert max(one.end_s for one in every_finding(health.findings)) < 95.0

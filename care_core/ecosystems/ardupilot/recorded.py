@@ -37,6 +37,8 @@ READS: Wanted = {
 _MODES = 2.0**32
 _SAME = 1e-5
 """A parameter is stored in 32 bits, its default written in decimals."""
+_SILENT_S = 10.0
+"""A vehicle beats once a second: ten beats in a row are lost by no slow link."""
 _REASONS_KNOWN = (4, 0)
 """Since Copter 4.0 MODE.Rsn means the same on every vehicle (AP_Vehicle/ModeReason.h)."""
 
@@ -108,10 +110,17 @@ class Recorded(RunModel):
 
     # --- the log and its vehicle -------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def end_s(self) -> float:
-        """When the log ends."""
-        return self.log.duration_s
+        """When the log ends; of telemetry, when the vehicle was heard last, where its station recorded on."""
+        return self.log.duration_s - self.silent_s
+
+    @cached_property
+    def silent_s(self) -> float:
+        """How long at its end telemetry holds nothing of the vehicle; 0 where that is no longer than a slow link takes."""
+        beats = self.one("STAT", "State") if self.is_telemetry else None
+        silent = 0.0 if beats is None or not len(beats) else self.log.duration_s - float(beats.t[-1])
+        return silent if silent > _SILENT_S else 0.0
 
     @property
     def is_telemetry(self) -> bool:

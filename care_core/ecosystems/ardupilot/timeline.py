@@ -392,6 +392,8 @@ def _end(flight: Flight) -> Iterator[Event]:
     aloft = ends_aloft(flight.run_at(flight.end_s))
     where = f" in the air, {aloft}" if aloft is not None else ""
     text = f"the log ends{where} with the vehicle armed: power lost, or the recording stopped"
+    if flight.silent_s:
+        text = f"the vehicle is heard no more{where}, armed; the station records for {flight.silent_s:.0f} s more"
     yield Event(flight.end_s, "log", text, "the log")
 
 

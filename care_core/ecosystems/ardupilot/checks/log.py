@@ -9,7 +9,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import LOST_SIGHT, Finding
 from care_core.ecosystems.spans import Span, seconds_in
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
@@ -129,15 +129,17 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         return
     if flight.arm_changes and not flight.arm_changes[-1][1]:
         return  # it was disarmed with its last record
-    sagging = _supply_falls(flight)
+    sagging, lost = _supply_falls(flight), flight.silent_s > 0.0
+    why = "power was lost or the recording was stopped"
+    if lost:
+        why = f"its link or its power was lost: the station records for {flight.silent_s:.0f} s more"
     yield Finding(
-        kind="battery" if sagging else "log",
-        title="power was lost in the air" if sagging else "the log ends in the air",
+        kind="battery" if sagging else "radio" if lost else "log",
+        title="power was lost in the air" if sagging else LOST_SIGHT if lost else "the log ends in the air",
         onset_s=flight.end_s,
         end_s=flight.end_s,
         severity="critical" if sagging else "warning",
-        evidence=f"armed {'and ' * aloft.is_falling}{aloft} at the last record: "
-        + (sagging or "power was lost or the recording was stopped"),
+        evidence=f"armed {'and ' * aloft.is_falling}{aloft} at the last record: {sagging or why}",
         source="EV, ARM, CTUN, POS, POWR",
         probability=_POWER_LOST_P if sagging else _ENDS_P,
     )
