@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping
 
 from care_core.ecosystems.findings import (
+    ASKED_SPEED,
     CAME_DOWN,
     LOST_SIGHT,
     NO_MISSION,
@@ -94,6 +95,7 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
     (r"(.*) no longer obeys?", r"look at \1: a servo that stuck, its gears and supply, linkage, horn and hinges"),
     ("the plane stalled", "look at what made it so slow: its lowest airspeed, its weight, its thrust"),
     (r"\w+ turns against its motors", "check the motors' order and directions with the motor test, and the propellers"),
+    (ASKED_SPEED, "look at the program that commands it: what it sends, in which unit, and what bounds it"),
     (
         LOST_SIGHT,
         "look for it where it was last (the map shows where); its own log, on its memory card, tells whether its link or "

@@ -42,7 +42,7 @@ EXPLAINS: Explains = {
     "laser": frozenset(("laser", "localisation", "planner", "blocked", "control", "tf", "software")),
     "localisation": frozenset(("localisation", "planner", "blocked", "control", "tf")),
     "drive": frozenset(("drive", "planner", "control", "prearm")),
-    "commands": frozenset(("drive", "planner", "control")),
+    "commands": frozenset(("drive", "planner", "control", "thrust", "attitude", "crash", "log")),
     "tf": frozenset(("tf", "planner", "control")),
     "topics": frozenset(("tf", "planner", "control")),  # no topic ends another: a node ends several
     "planner": frozenset(("planner", "control", "tf")),  # one that finds no path keeps the computer busy

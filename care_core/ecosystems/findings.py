@@ -165,6 +165,8 @@ OF_MONITOR = NO_BATTERY, MONITOR_SILENT
 """What titles begin with that speak of the monitor of a battery, and of no pack."""
 CAME_DOWN = "it came down and could not rise again"
 LOST_SIGHT = "the vehicle is heard no more, in the air"
+ASKED_SPEED = "a program asks it for "
+"""Begins the title of a speed that nobody means, which follows."""
 
 
 class OfRun(Record):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from care_core.ecosystems.ardupilot.checks import (
+    asked_speed,
     attitude,
     barometer,
     battery,
@@ -76,6 +77,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     trims.CHECK,
     transition.CHECK,
     time_to_climb.CHECK,
+    asked_speed.CHECK,
     attitude.CHECK,
     barometer.CHECK,
     battery.CHECK,
