@@ -388,10 +388,24 @@ def _unjudged(unknown: Sequence[JudgedObjective], found: str, *, is_all: bool) -
 
 def _unjudged_for(alike: Sequence[JudgedObjective], *, is_one_of_many: bool = False) -> str:
     """What kept objectives from being judged that share the first clause of their reasons."""
-    told, reason = ", ".join(one.name for one in alike).replace("_", " "), alike[0].reason
+    names, reason = [one.name for one in alike], alike[0].reason
+    told = ", ".join(names).replace("_", " ")
+    if _ASKED_OF_RUN.keys() >= set(names):
+        told = f"whether it {listed([_ASKED_OF_RUN[name] for name in names])}"
     if not reason:
         return f"{told} could not be evaluated"
-    return reason if is_one_of_many or len(alike) > FEW else f"{told}: {reason}"
+    return reason if is_one_of_many or len(alike) > FEW else f"{told}: {_HINT.sub('', reason)}"
+
+
+_HINT = re.compile(r" \((?:record|copy) .*\)$")
+"""What is to be done about a reason, which stands with the objective."""
+
+
+_ASKED_OF_RUN = {
+    "armed": "armed", "took_off": "took off", "moved": "moved", "no_crash": "crashed", "no_failsafe": "met a failsafe",
+    "landed": "landed", "disarmed": "was disarmed",
+}  # fmt: skip
+"""What a run is asked that flew no mission, in words that say neither yes nor no."""
 
 
 _CAME_DOWN = ("control was lost at ", "it hit the ground at ")

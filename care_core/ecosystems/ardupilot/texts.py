@@ -61,6 +61,15 @@ class Refusal(NamedTuple):
         """Why, without the numbers that change from one complaint to the next."""
         return _NUMBERS.sub("", self.why)
 
+    @property
+    def complaint(self) -> str:
+        """What tells one complaint from another: the same without what was measured."""
+        return _RATES.sub("", self.plain)
+
+
+_RATES = re.compile(r"\b\d+(?:\.\d+)?(?=Hz\b)")
+"""What a check measured, where it stands inside its sentence."""
+
 
 def refusal_of(time_s: float, text: str) -> Refusal | None:
     """The refusal of arming that a text is, None where it is none."""

@@ -34,7 +34,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     t, asked, flown = speeds
     limit = max(_LEAST_MS, _ABOVE * usual * _CM)
-    guided = np.isin(flight.modes_at(t), [one.number for one in flight.modes if one.way == "guided"])
+    numbers = [one.number for one in flight.modes if one.number is not None and one.way == "guided"]
+    guided = np.isin(flight.modes_at(t), numbers)
     spans = [span for span in runs(t, guided & (asked > limit)) if span[1] - span[0] >= _LASTS_S]
     inside = during(spans, t)
     if not spans or float(flown[inside].max()) < _FLOWN * limit:

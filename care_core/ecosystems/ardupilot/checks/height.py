@@ -37,7 +37,9 @@ _TRUE_P = LIMITS.add("probability that it is so", 0.8, "", "a choice: both are m
 _LOST_P = LIMITS.add("probability that it costs the mission", 0.4, "", "a choice: the barometer corrects most of it")
 _SOURCES = (("EK3_SRC1_POSZ", 1.0), ("EK3_ALT_SOURCE", 0.0), ("EK2_ALT_SOURCE", 0.0))
 """The value with which the height is that of the barometer."""
-_FASTEST_MS = LIMITS.add("climb of a copter, at most", 50.0, "m/s", "none climbs so fast: a damaged value, or another unit")
+_FASTEST_MS = LIMITS.add(
+    "climb of a copter, at most", 50.0, "m/s", "none climbs so fast: a damaged value, or another unit"
+)
 _HELD = frozenset(("hold", "mission", "return", "land", "guided"))
 _ALT_HOLD = 2
 _FIX, _CM = 3, 0.01

@@ -42,14 +42,14 @@ def find(flight: Flight) -> Iterator[Finding]:
     refusals, lasting = flight.refusals, standing(flight)
     if not lasting:
         return
-    counts = Counter(one.plain for one in lasting)
-    why = max(counts, key=lambda one: counts[one])
-    begin = next(one.time_s for one in refusals if one.plain == why)
+    counts, plain = Counter(one.complaint for one in lasting), {one.complaint: one.plain for one in lasting}
+    most = max(counts, key=lambda one: counts[one])
+    why, begin = plain[most], next(one.time_s for one in refusals if one.complaint == most)
     asked = any(one.was_tried for one in refusals)
     severity: Severity = "critical" if asked else "warning"
     by_operator = all(_BY_OPERATOR.search(one.why) for one in lasting)
     suspect: SuspectKind = "operation" if by_operator else "parameter"
-    complaints = tuple(dict.fromkeys(one.plain for one in lasting))
+    complaints = tuple(plain.values())
     finding = Finding(
         kind="prearm",
         title=f"arming {'was' if asked else 'would be'} refused: {why}",

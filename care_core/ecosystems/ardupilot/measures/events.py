@@ -47,7 +47,7 @@ def refused_for(mission: Mission) -> str:
     """What stood when arming was last refused, a few of it in words; empty where nothing was refused."""
     if not flight_of(mission).refusals:
         return ""
-    told = {one.plain: one.why for one in last_refusals(mission)}
+    told = {one.complaint: one.why for one in last_refusals(mission)}
     return listed(list(told.values())[:_FEW])
 
 
