@@ -98,8 +98,8 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
     (ASKED_SPEED, "look at the program that commands it: what it sends, in which unit, and what bounds it"),
     (
         LOST_SIGHT,
-        "look for it where it was last (the map shows where); its own log, on its memory card, tells whether its link or "
-        "its power was lost",
+        "look for it where it was last (the map shows where); its own log, on its memory card, tells whether its link "
+        "or its power was lost",
     ),
     (
         rf"power was lost|the log ends in the air|{re.escape(OWN_SUPPLY)}",

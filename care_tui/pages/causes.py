@@ -284,7 +284,8 @@ class CausesPage(ProvenPage):
             self._wanted = option
             self._decided(self.session.take_back(option), f"{option} is back in the fix.")
             return
-        prompt = Prompt(f"Set {option} aside", hint="Why not? The reason goes into the report. Enter sets it aside, Esc cancels.")
+        hint = "Why not? The reason goes into the report. Enter sets it aside, Esc cancels."
+        prompt = Prompt(f"Set {option} aside", hint=hint)
         self.app.push_screen(prompt, lambda reason: self._dismissed(option, reason))
 
     def _dismissed(self, option: str, reason: str | None) -> None:

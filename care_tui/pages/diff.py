@@ -191,7 +191,8 @@ class DiffPage(ProvenPage):
         if case is None or fix is None:
             return
         files = ", ".join(str(name) for name in case.configs)
-        odds = "" if fix.odds is None else f" {percent(fix.odds)} probability that the next run then meets all objectives."
+        meets = "probability that the next run then meets all objectives"
+        odds = "" if fix.odds is None else f" {percent(fix.odds)} {meets}."
         question = f"Put {number_of(len(fix.changes), 'change')} into {files}?{odds}"
         keys = "y writes it and keeps the old one as .bak, n or Esc leaves it"
         self.app.push_screen(Confirm(question, keys, [*doubts, *self._cautions(fix)]), self._confirmed)

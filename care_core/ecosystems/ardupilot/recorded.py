@@ -117,7 +117,7 @@ class Recorded(RunModel):
 
     @cached_property
     def silent_s(self) -> float:
-        """How long at its end telemetry holds nothing of the vehicle; 0 where that is no longer than a slow link takes."""
+        """How long at its end telemetry holds nothing of the vehicle; 0 for what a slow link may take."""
         beats = self.one("STAT", "State") if self.is_telemetry else None
         silent = 0.0 if beats is None or not len(beats) else self.log.duration_s - float(beats.t[-1])
         return silent if silent > _SILENT_S else 0.0
