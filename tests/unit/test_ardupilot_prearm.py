@@ -35,3 +35,15 @@ def test_a_refusal_for_what_an_operator_has_to_do_is_no_parameters(text: str, su
     (finding,) = [one for one in made.find() if one.kind == "prearm"]
     assert finding.suspect == suspect
     assert (finding.probability > 0.9) == (suspect == "operation")
+
+
+@pytest.mark.parametrize(("channel", "named"), [(8.0, ("RCMAP_THROTTLE",)), (3.0, ())])
+def test_a_stick_on_another_channel_is_named_that_nobody_can_centre(channel: float, named: tuple[str, ...]) -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.settings["RCMAP_THROTTLE"] = channel
+    text = f"Arm: Throttle (RC{channel:g}) is not neutral"
+    made.rows["MSG"] = [(20.0, {"Message": text}), (50.0, {"Message": text})]
+    (finding,) = [one for one in made.find() if one.kind == "prearm"]
+    assert finding.parameters == named

@@ -28,6 +28,8 @@ _BY_OPERATOR = re.compile(
 )
 """Complaints of what the pilot has to do or somebody to set up before a start: sticks, switches, mode, calibration.
 None of them reads a parameter that a flight is tuned by (AP_Arming.cpp, AP_Arming_Copter.cpp, RC_Channel.cpp)."""
+_CHANNELS = "RCMAP_"
+"""Beginning of what says which channel a stick is on: on another, no pilot centres it."""
 LIMITS = Limits()
 _SURE_P = LIMITS.add(
     "probability of what the pilot has to do", 0.95, "", "the firmware says itself that this kept it from arming"
@@ -61,7 +63,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         suspect=suspect,
         probability=_SURE_P if by_operator else _BY_SETTING_P,
     )
-    yield _blaming(finding, tuple(one for one in refusing(flight) if one.is_shown or not by_operator))
+    blamed = (one for one in refusing(flight) if one.is_shown or not by_operator or one.name.startswith(_CHANNELS))
+    yield _blaming(finding, tuple(blamed))
 
 
 def _blaming(finding: Finding, blamed: tuple[Refusing, ...]) -> Finding:
