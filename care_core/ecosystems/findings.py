@@ -135,6 +135,7 @@ NOT_FLOWN = "the vehicle never armed: no run of it is in this log"
 
 OWN_SUPPLY = "the autopilot's own supply"
 """What the title of a finding about the board's voltage, not the pack's, begins with."""
+LOW_SUPPLY = f"{OWN_SUPPLY} is low"
 UNCHARGED = "the battery was not charged"
 SAGS = "the battery sags under its load"
 BATTERY_FAILSAFE = "battery failsafe"

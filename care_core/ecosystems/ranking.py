@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from care_core.ecosystems.explains import EXPLAINS, REFUSES, Explains
-from care_core.ecosystems.findings import OF_MONITOR, OWN_SUPPLY, UNCHARGED, Finding, FindingKind
+from care_core.ecosystems.findings import LOW_SUPPLY, OF_MONITOR, OWN_SUPPLY, UNCHARGED, Finding, FindingKind
 from care_core.records import replace
 
 SLACK_S = 1.5
@@ -128,12 +128,15 @@ def _brought_down(finding: Finding) -> bool:
 
 def _needs_no_pack(battery: Finding, finding: Finding) -> bool:
     """Whether a battery is no reason of it. A pack makes no inertial sensor wrong, unless the autopilot's own supply
-    fails with it; one that was not charged weakens not one motor among several, nor a supply of 5 V; and of a monitor
-    that measures none only the failsafe acts: it charges no pack, and empties none."""
+    fails with it; one that was not charged weakens not one motor among several, nor a supply of 5 V; of a monitor that
+    measures none only the failsafe acts: it charges no pack, and empties none; and a supply that was low all along,
+    and that did not fall at the end, ends no log."""
     if battery.title.startswith(OF_MONITOR):
         return finding.kind not in _OF_A_FAILSAFE or finding.title == UNCHARGED
     is_one_of_several = finding.kind == "motor" or finding.title.startswith(OWN_SUPPLY)
     of_sensor = finding.kind == "imu" and not battery.title.startswith(OWN_SUPPLY)
+    if finding.kind == "log" and battery.title == LOW_SUPPLY:
+        return True
     return of_sensor or (battery.title == UNCHARGED and is_one_of_several)
 
 

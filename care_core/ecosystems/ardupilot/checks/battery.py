@@ -20,6 +20,7 @@ from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_pro
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import (
     BATTERY_FAILSAFE,
+    LOW_SUPPLY,
     MONITOR_SILENT,
     NO_BATTERY,
     OWN_SUPPLY,
@@ -284,7 +285,7 @@ def _board(flight: Flight) -> Iterator[Finding]:
     dips = usual - least > _DIP_V
     yield Finding(
         kind="battery",
-        title=f"{OWN_SUPPLY} {'dips' if dips else 'is low'}",
+        title=f"{OWN_SUPPLY} dips" if dips else LOW_SUPPLY,
         onset_s=float(at[0]),
         end_s=float(at[-1]),
         severity="critical" if dips and weak.sum() > _DIPS else "warning",
