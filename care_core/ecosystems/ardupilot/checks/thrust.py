@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks import bench
 from care_core.ecosystems.ardupilot.checks.settings import hover
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
@@ -57,8 +58,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     driven = flight.throttle
     if not flight.is_copter or flight.kind == "heli" or driven is None:
         return  # what a helicopter records as throttle is its collective pitch
-    if hover.kept_down(flight) is not None:
-        return  # a parameter keeps it down
+    if hover.kept_down(flight) is not None or bench.unmoved(flight) is not None:
+        return  # a parameter keeps it down, or it has no propellers
     t, throttle = driven
     flown = during(flight.flown or flight.watched, t) & (throttle > _FLYING)
     if flown.sum() < 5:
