@@ -226,10 +226,22 @@ class CausesPage(ProvenPage):
         told = [*diagnosis.notes, *(one.text for one in diagnosis.outside)]
         rows = hypothesis_rows(hypothesis, finding, told)
         if finding is None:
-            return Rows(rows)
+            return Rows([*rows, *self._set_as(hypothesis.name if hypothesis.what == "parameter" else "")])
         first = [labelled("Seen by", finding.evidence)] if finding.evidence else []
         figure = self.figure(finding.title, finding, self.height(first))
         return Rows([*first, *figure, *(() if self.is_wide else rows)])
+
+    def _set_as(self, name: str) -> list[Row]:
+        """How a parameter is set that nothing in this run speaks for, and why it is told all the same."""
+        option = next((one for one in self.session.options() if one.name == name), None)
+        current = None if option is None else self.session.current(option)
+        reference = None if option is None else self.session.reference(option)
+        if option is None or current is None or reference is None:
+            return []
+        return [
+            labelled("This run", f"{option.show(current)}, the reference is {option.show(reference)}"),
+            labelled("Why", "it is off its reference, and nothing in this run speaks for it or against it"),
+        ]
 
     def beside(self) -> tuple[str, list[Row]]:
         return "Path and fix", self._path_and_fix()

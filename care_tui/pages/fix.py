@@ -159,13 +159,13 @@ class FixPage(FiguredPage, DiagnosisPage):
             rows += [*no_fix_rows(session.diagnosis).rows, Row(Content())]
         shown = session.fix if ticked else session.unchanged
         if shown is not None:
-            rows += outcome_rows(shown, session.diagnosis.objectives, self.glyphs)
-            if shown.why_not_measured:
-                rows.append(warning("Odds", f"not measured: {shown.why_not_measured}"))
             rows += [warning("Unless", f"it happens again: {title}") for title in session.diagnosis.lost_by]
             rows += [
                 warning("Unless", f"{name} acts again, of which training knows nothing") for name in self._unknown()
             ]
+            rows += outcome_rows(shown, session.diagnosis.objectives, self.glyphs)
+            if shown.why_not_measured:
+                rows.append(warning("Odds", f"not measured: {shown.why_not_measured}"))
         if option is not None:
             rows += [Row(Content()), *option_rows(option, self._caveats(option), self.glyphs)]
         return rows
