@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from care_core.causal.model import EffectRecord
 from care_core.diagnose.failed_run import FailedRun
@@ -23,9 +23,15 @@ SURE, UNSURE = 0.4, 0.1
 HIGH_SUPPORT, LOW_SUPPORT = 0.8, 0.5
 
 
-def causes_of(failed: FailedRun, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
+def causes_of(
+    failed: FailedRun, result: ObjectiveResult, found: tuple[Suspect, ...], top: int, needs: Mapping[str, float]
+) -> tuple[Cause, ...]:
     """Options that cost this run, those that a failed check names first; where none of them convinces, a few leads
-    that are not ruled out behind them; none of a vehicle that never armed, which no flight shows anything of."""
+    that are not ruled out behind them; none of a vehicle that never armed, which no flight shows anything of.
+
+    Args:
+        needs: per objective what the reference configuration needs, which its limit is a multiple of.
+    """
     others = not_ruled_out(failed.query, result.variable.name, found)
     refused = failed.run.refused_by if result.variable.kind == "functional" else frozenset()
     first = [suspect for suspect in (*found, *others) if suspect.option in refused]
@@ -37,24 +43,25 @@ def causes_of(failed: FailedRun, result: ObjectiveResult, found: tuple[Suspect, 
         weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION > suspect.weight]
         named += [*weak, *others][: max(0, MOST_LEADS - len(named))]
     named = first + [suspect for suspect in named if suspect not in first]
-    return tuple(_cause(failed, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
+    return tuple(_cause(failed, result, suspect, rank, needs) for rank, suspect in enumerate(named[:top], start=1))
 
 
-def _cause(failed: FailedRun, result: ObjectiveResult, suspect: Suspect, rank: int) -> Cause:
+def _cause(
+    failed: FailedRun, result: ObjectiveResult, suspect: Suspect, rank: int, needs: Mapping[str, float]
+) -> Cause:
     name, query = suspect.option, failed.query
     option = failed.profile.schema.variables[name]
     is_predictable = result.variable.name in query.model.outcomes and name not in query.kept
     best = best_alone(query, name) if is_predictable else None
-    *steps, end = describe_path(suspect.path, query, failed.run, by_physics=suspect.by_physics)
-    if result.need is not None:  # what its limit is a multiple of: nobody is told two numbers for one thing
-        end = replace(end, expected=result.need.value)
+    path = describe_path(suspect.path, query, failed.run, by_physics=suspect.by_physics)
     in_support = query.model.supports(name, query.config[name])
     support = 1.0 if suspect.by_physics else (suspect.effect.support if suspect.effect is not None else None) or 0.0
     changed = query.config if best is None else {**query.config, name: best[0]}
     return Cause(
         rank=rank,
         option=option,
-        path=(*steps, end),
+        # What its limit is a multiple of: nobody is told two numbers for one thing.
+        path=tuple(replace(node, expected=needs.get(node.name, node.expected)) for node in path),
         path_ace=suspect.path.ace,
         total_effect=suspect.total_effect,
         contribution=suspect.contribution,

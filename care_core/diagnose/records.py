@@ -80,10 +80,10 @@ class ObjectiveResult(Record):
             return ""
         need = f"{figures(self.need.value)} {self.variable.unit}".rstrip()
         least = self.variable.relative.at_least
-        if self.threshold.value == least and self.variable.relative.ratio != 1:
+        if self.threshold.value == least:
             allowed = f"{least:g} {self.variable.unit}".rstrip()
             return f"{allowed} is always allowed; the reference configuration needs {need} for this mission"
-        if self.threshold.value == least or self.variable.relative.ratio == 1:
+        if self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
         if self.threshold != self.variable.relative.for_need(self.need.value):
             return (

@@ -101,8 +101,9 @@ def diagnose(
     blamed = blame(judged, profile, query, health, good)
     failed = FailedRun(profile, choice, run, query, reference_note(judged), blamed.unranked, health.findings)
     unheard = _unheard(failed, broken, health)
+    needs = {one.variable.name: one.need.value for one in judged.results if one.need is not None}
     faults = tuple(
-        Fault(result, () if why else causes_of(failed, result, blamed.ranked[result.variable.name], top))
+        Fault(result, () if why else causes_of(failed, result, blamed.ranked[result.variable.name], top, needs))
         for result, why in zip(broken, unheard, strict=True)
     )
     hypotheses = hypotheses_of(blamed.failure)
