@@ -67,6 +67,8 @@ LEAST = 0.005
 """Hypotheses less likely than this have no line of their own."""
 UNNAMED = "chance, or what no log shows"
 """What chance is called where there is no reference configuration that could fail as well."""
+NOT_SHOWN = "nothing that this log shows"
+"""The same where it stands alone."""
 NONE_OUTSIDE: Mapping[str, float] = MappingProxyType({})
 _WHAT: Mapping[SuspectKind, What] = {"hardware": "hardware", "world": "world", "operation": "world"}
 
@@ -178,7 +180,9 @@ def hypotheses_without_model(
             share = finding.probability * mission_lost(finding) / len(named)
             options["parameter", option] = max(options.get(("parameter", option), 0.0), share)
     failure = NoisyOr({CHANCE: UNTOLD_BY_FIT[verdict], **with_findings(options, findings)})
-    return tuple(replace(one, name=UNNAMED) if one.what == "chance" else one for one in hypotheses_of(failure))
+    told = hypotheses_of(failure)
+    rest = UNNAMED if len(told) > 1 else NOT_SHOWN
+    return tuple(replace(one, name=rest) if one.what == "chance" else one for one in told)
 
 
 def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Sequence[Suspect]]) -> dict[str, float]:
