@@ -36,6 +36,7 @@ from care_core.ecosystems.ros.motion import Odometry
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, kept_its_rate, level_word, loop_rate
 from care_core.ecosystems.ros.other_robots import other_goals
 from care_core.ecosystems.ros.recoveries import announced, repairs
+from care_core.ecosystems.spans import runs
 from care_core.ecosystems.timeline import counted
 from care_core.logs.ros_message import short_name
 from care_core.numbers import Floats
@@ -49,6 +50,8 @@ STOOD_M = 0.5
 """A robot that comes no farther has not moved enough for a localisation to say so: amcl's update_min_d is 0.25 m."""
 SLOWER, SLOWER_S = 0.5, 10.0
 """A stream whose rate falls below this share of what it was, for so long, is told of."""
+_MOVES_S = 0.5
+"""Shortest movement that is told as one: the speed of what stands is noise."""
 _NAMED = 6
 """Topics or nodes that one moment names."""
 _TEXT = 110
@@ -269,7 +272,8 @@ def _motion(drive: Drive) -> Iterator[Event]:
         if not len(rows):
             yield Event(end_s, "motion", "the robot never moved", odometry.topic)
         else:
-            began_s = max(0.0, float(odometry.t[rows[0]]))  # by its own stamp, which may lie before the recording
+            lasting = (start for start, end in runs(odometry.t, odometry.moves) if end - start >= _MOVES_S)
+            began_s = max(0.0, next(lasting, float(odometry.t[rows[0]])))  # its own stamp may lie before the recording
             yield Event(began_s, "motion", "the robot moves for the first time", odometry.topic)
             yield Event(end_s, "motion", _driven(odometry), odometry.topic)
     for battery in drive.batteries:
