@@ -29,6 +29,8 @@ from care_core.variables import Role, Threshold, Variable
 _YES = Threshold("==", 1.0)
 _ACCOMPLISHED = frozenset(("mission_success", "outcome"))
 """Extractors that say whether a flight was accomplished."""
+_AT_END_S = 1.0
+"""What is damaged so shortly before a mission's end is its end."""
 _FEW = 10
 """As many names can be listed in a sentence."""
 
@@ -273,7 +275,8 @@ def meaningful(
 ) -> dict[str, Value]:
     """The run's objectives, those withheld whose value means nothing for its mission."""
     if not run.mission.ended:
-        mend = "the file is damaged: copy it again" if run.log.damage else "record until the mission has ended"
+        last = [one for one in run.log.damage if one.time_s is None or one.time_s >= run.mission.end_s - _AT_END_S]
+        mend = "the file breaks off: see whether the original is longer" if last else "record until the mission has ended"
         cut = Unavailable("the log ends before the mission does", mend)
         return {
             name: value if isinstance(value, Unavailable) and value.reason != cut.reason else cut

@@ -397,7 +397,7 @@ def _unjudged_for(alike: Sequence[JudgedObjective], *, is_one_of_many: bool = Fa
     return reason if is_one_of_many or len(alike) > FEW else f"{told}: {_HINT.sub('', reason)}"
 
 
-_HINT = re.compile(r" \((?:record|copy) .*\)$")
+_HINT = re.compile(r" \((?:record|the file) .*\)$")
 """What is to be done about a reason, which stands with the objective."""
 
 
