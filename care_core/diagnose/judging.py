@@ -276,8 +276,10 @@ def meaningful(
     """The run's objectives, those withheld whose value means nothing for its mission."""
     if not run.mission.ended:
         last = [one for one in run.log.damage if one.time_s is None or one.time_s >= run.mission.end_s - _AT_END_S]
-        mend = "the file breaks off: see whether the original is longer" if last else "record until the mission has ended"
-        cut = Unavailable("the log ends before the mission does", mend)
+        longer = "the file breaks off: see whether the original is longer"
+        cut = Unavailable(
+            "the log ends before the mission does", longer if last else "record until the mission has ended"
+        )
         return {
             name: value if isinstance(value, Unavailable) and value.reason != cut.reason else cut
             for name, value in run.objectives.items()
