@@ -317,8 +317,12 @@ def _(report: Report) -> bool:
 @_named("flown again as it was after it was upset")
 def _(report: Report) -> bool:
     upset = any(kind in _UPSET and severity == "critical" for kind, severity, _ in _titles(report))
-    as_it_was = (text.removesuffix("then run again") for text in _next(report))  # a simulation, once it is put right
+    # A simulation runs again once it is put right; a real vehicle is tried where nothing can be hurt.
+    as_it_was = (text.removeprefix(_CHANGED).removesuffix("then run again") for text in _next(report))
     return upset and any("run again" in text or "run the same" in text for text in as_it_was)
+
+
+_CHANGED = "make the change, run again"
 
 
 def _next(report: Report) -> Iterator[str]:

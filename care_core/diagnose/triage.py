@@ -123,7 +123,7 @@ def diagnose(
         faults=faults,
         fix=fix,
         alternatives=advised.alternatives,
-        odds_as_driven=as_driven,
+        odds_as_driven=None if fix is not None and fix.shown_by else as_driven,  # none measured, none told
         abstained=advised.abstained,
         why_this=advised.why or _why_this(fix, as_driven, hypotheses, faults),
         notes=notes_of(failed, broken, fix if advised.lead is None else None, as_driven),
