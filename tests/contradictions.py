@@ -317,12 +317,10 @@ def _(report: Report) -> bool:
 @_named("flown again as it was after it was upset")
 def _(report: Report) -> bool:
     upset = any(kind in _UPSET and severity == "critical" for kind, severity, _ in _titles(report))
-    # A simulation runs again once it is put right; a real vehicle is tried where nothing can be hurt.
-    as_it_was = (text.removeprefix(_CHANGED).removesuffix("then run again") for text in _next(report))
+    as_it_was = (text.removesuffix("then run again") for text in _next(report))  # a simulation, once it is put right
+    if any(one.text.startswith("SIM ") for one in report.account):  # so is one once the change is made
+        as_it_was = (text.removeprefix("make the change, run again") for text in as_it_was)
     return upset and any("run again" in text or "run the same" in text for text in as_it_was)
-
-
-_CHANGED = "make the change, run again"
 
 
 def _next(report: Report) -> Iterator[str]:

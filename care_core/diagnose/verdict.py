@@ -498,10 +498,8 @@ def fit_line(profile: str, fit: Fit, lines: int = 1, line: int = LINE) -> str:
 def fit_text(profile: str, fit: Fit) -> str:
     """Which profile (empty: none) fits how well, and what that means for the answer."""
     reasons = f": {'; '.join(fit.reasons)}" if fit.reasons else ""
-    caution = {"fits": "", "partly": ", so confidence is low at most", "no": " (training tells nothing of this log)"}[
-        fit.verdict
-    ]
-    return f"{fit_words(profile, fit.verdict)}{reasons}{caution if profile else ''}"
+    cautions = {"fits": "", "partly": ", so confidence is low at most", "no": " (training tells nothing of this log)"}
+    return f"{fit_words(profile, fit.verdict)}{reasons}{cautions[fit.verdict] if profile else ''}"
 
 
 def chance(share: float, is_guess: bool = False) -> str:

@@ -135,9 +135,8 @@ def _needs_no_pack(battery: Finding, finding: Finding) -> bool:
         return finding.kind not in _OF_A_FAILSAFE or finding.title == UNCHARGED
     is_one_of_several = finding.kind == "motor" or finding.title.startswith(OWN_SUPPLY)
     of_sensor = finding.kind == "imu" and not battery.title.startswith(OWN_SUPPLY)
-    if finding.kind == "log" and battery.title == LOW_SUPPLY:
-        return True
-    return of_sensor or (battery.title == UNCHARGED and is_one_of_several)
+    of_the_end = finding.kind == "log" and battery.title == LOW_SUPPLY
+    return of_sensor or of_the_end or (battery.title == UNCHARGED and is_one_of_several)
 
 
 def may_refuse(cause: Finding, finding: Finding) -> bool:
