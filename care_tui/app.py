@@ -38,7 +38,6 @@ from care_tui.screens.help import HelpScreen, Keys
 from care_tui.settings import SERVER, Settings
 from care_tui.themes import DEFAULT, HIGH_CONTRAST, OWN_COLOURS
 from care_tui.threads import DaemonThreads
-from care_tui.tracebacks import shorten
 from care_tui.workspace import Workspace
 
 _LEAVE_S, _MOST_S = 0.05, 3.0
@@ -108,6 +107,7 @@ class CareApp(App[int], inherit_bindings=False):
         if SERVER in os.environ:
             self.set_interval(_LOOK_S, self._end_with_server)
         self.push_screen(self._case)
+        self.call_after_refresh(_shorten_tracebacks)
 
     def _end_on_signals(self) -> None:
         """A lost connection or a polite kill ends the app as `q` does, so the terminal is given back as it was."""
@@ -276,9 +276,15 @@ def is_folder_of_logs(path: Path) -> bool:
     return os.path.isdir(path) and not is_openable(path)
 
 
+def _shorten_tracebacks() -> None:
+    """After the first frame, which the import of what prints them would hold up."""
+    from care_tui.tracebacks import shorten
+
+    shorten()
+
+
 def run(request: Request | None, settings: Settings) -> int:
     """Open the app; answers the exit code."""
-    shorten()
     app = CareApp(request, settings=settings)
     answer = app.run(mouse=settings.mouse)
     for file in dict.fromkeys(app.workspace.written):

@@ -1,5 +1,5 @@
 """A frame on its way to the terminal, in fewer bytes: Textual sets and resets the style of every piece of text, and
-writes what is empty to the end of each line, which a slow link pays for."""
+writes every empty cell, which a slow link pays for."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ _PART = re.compile(
 )
 _STRANGE = re.compile(r"\x1b(?!\[[\d;]*m|\[\d+;\d+H)")
 """What a frame does not hold: questions, modes, links."""
-_SHORTEST = 4
-"""Empty cells to the end of a line that are longer to write than to erase."""
+_SHORTEST, _SHORTEST_GAP = 4, 12
+"""Empty cells that are longer to write than to erase: to the end of a line (EL), and before more text, where the cursor
+has to pass over them, too (ECH and CUF, ECMA-48 sections 8.3.38 and 8.3.20)."""
 _FILLED = re.compile(r"4|7|9|21|53|4\d|10\d")
 """Styles that show in an empty cell: underlined, reversed, struck out, overlined, and backgrounds."""
 
@@ -82,7 +83,8 @@ class _Writer:
         if self._blanks:
             if self._style[1]:
                 self._set(("", False))
-            self._out.append(" " * self._blanks)
+            gap = self._blanks
+            self._out.append(" " * gap if gap < _SHORTEST_GAP else f"\x1b[{gap}X\x1b[{gap}C")
             self._blanks = 0
 
     def _end_line(self) -> None:

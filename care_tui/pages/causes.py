@@ -126,7 +126,8 @@ class CausesPage(ProvenPage):
         self.refresh_bindings()
 
     def moved(self, index: int) -> None:
-        self.refresh_bindings()
+        if self.session.dismissed:  # else no key has another label
+            self.refresh_bindings()
 
     @property
     def _here(self) -> Explanation | None:

@@ -66,22 +66,19 @@ def plot(  # noqa: PLR0913 (a plot has all of these)
     # Every other column (in ASCII another sign), for a terminal without colours tells the two apart as well.
     behind = [part if ascii or x % 4 == 0 else None for x, part in enumerate(_filled(wanted, low, high, tall))]
     behind += [None] * (len(actual) - len(behind))
-    across = 1 if ascii else 2
+    dots, behind_dots = _dots(actual, tall, ascii=ascii), _dots(behind, tall, ascii=ascii)
     at_zero = _row(0.0, low, high, height) if zero and low < 0 < high else None
     lines = []
     for y in range(height):
         cells = []
-        for x in range(0, len(actual), across):
-            here, there = (
-                (_star(parts[x], tall - 1 - y, sign) if ascii else _cell(parts[x : x + 2], tall - 1 - 4 * y))
-                for parts, sign in ((actual, "*"), (behind, "."))
-            )
-            place = x // across
-            shade = span is not None and span[0] <= place <= span[1]
-            empty = rule if place == cursor else zero if y == at_zero else shaded if shade else " "
-            both = here if ascii and here != " " else there if here == " " else _together(here, there)
-            style = "dim" if both == " " else WANTED if here == " " else ACTUAL
-            cells.append((empty if both == " " else both, style))
+        for place in range(len(actual) if ascii else (len(actual) + 1) // 2):
+            here, there = dots.get((place, y), 0), behind_dots.get((place, y), 0)
+            if here or there:
+                sign = ("*" if here else ".") if ascii else chr(EMPTY + (here | there))
+                cells.append((sign, ACTUAL if here else WANTED))
+            else:
+                shade = span is not None and span[0] <= place <= span[1]
+                cells.append((rule if place == cursor else zero if y == at_zero else shaded if shade else " ", "dim"))
         lines.append(assembled(cells))
     return lines
 
@@ -117,28 +114,23 @@ def _joined(parts: Sequence[tuple[int, int] | None]) -> list[tuple[int, int] | N
     return joined
 
 
-def _star(part: tuple[int, int] | None, row: int, sign: str) -> str:
-    return sign if part is not None and part[0] <= row <= part[1] else " "
-
-
-def _cell(pair: Sequence[tuple[int, int] | None], top: int) -> str:
-    """Two columns of four dots, the highest at `top`."""
-    bits = 0
-    for column, part in enumerate(pair):
-        for depth in range(4):
-            if part is not None and part[0] <= top - depth <= part[1]:
-                bits |= _BITS[column][depth]
-    return chr(EMPTY + bits) if bits else " "
+def _dots(parts: Sequence[tuple[int, int] | None], tall: int, *, ascii: bool) -> dict[Cells, int]:
+    """The bits of every cell in which there are dots, by column and by line from the top down."""
+    across, deep = (1, 1) if ascii else (2, 4)
+    cells: dict[Cells, int] = {}
+    for x, part in enumerate(parts):
+        if part is None:
+            continue
+        top, bottom = tall - 1 - part[1], tall - 1 - part[0]
+        for y in range(top // deep, bottom // deep + 1):
+            bits = _BITS[x % across][max(top - deep * y, 0) : bottom - deep * y + 1]
+            cells[x // across, y] = cells.get((x // across, y), 0) | sum(bits)
+    return cells
 
 
 def dot_sign(dots: Collection[tuple[int, int]]) -> str:
     """The braille sign of these dots of a cell, by column and by row from the top down."""
     return chr(EMPTY + sum(_BITS[x][y] for x, y in dots))
-
-
-def _together(here: str, there: str) -> str:
-    """The dots of both cells."""
-    return here if there == " " else chr(EMPTY + ((ord(here) - EMPTY) | (ord(there) - EMPTY)))
 
 
 def assembled(cells: Sequence[tuple[str, str]]) -> Content:

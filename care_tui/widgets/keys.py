@@ -26,9 +26,20 @@ class Keys(Static):
         self._glyphs = glyphs
         self._label_of = label_of
         self._keys = Content()
+        self._is_asked = False
+        """Whether the keys are to be told once all that was set off is done: several signals come of one key."""
 
     def on_mount(self) -> None:
-        self.screen.bindings_updated_signal.subscribe(self, self.tell)
+        self.screen.bindings_updated_signal.subscribe(self, self._ask)
+
+    def _ask(self, _screen: Screen[object]) -> None:
+        if not self._is_asked:
+            self._is_asked = True
+            self.call_after_refresh(self._tell_asked)
+
+    def _tell_asked(self) -> None:
+        self._is_asked = False
+        self.tell(self.screen)
 
     def on_resize(self) -> None:
         self.tell(self.screen)

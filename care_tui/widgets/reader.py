@@ -7,6 +7,7 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.events import Resize
+from textual.geometry import Size
 from textual.message import Message
 from textual.strip import Strip
 
@@ -43,6 +44,8 @@ class Reader(Pane):
         self._filter = ""
         self._lines: list[Content] = []
         self._width = 0
+        self._shown_in: Size | None = None
+        """The room that the text was made for; None before there was any."""
 
     @property
     def plain(self) -> str:
@@ -59,6 +62,7 @@ class Reader(Pane):
     def show(self, rows: Rows, *, from_top: bool = True) -> None:
         """Replace the text."""
         self._rows = rows
+        self._shown_in = self.room if self.has_room else None
         self._wrap()
         if from_top:
             self.top = 0
@@ -91,7 +95,8 @@ class Reader(Pane):
             self._wrap()
             self.refresh()
         super().on_resize(event)
-        self.post_message(self.Fitted(self))
+        if self._shown_in != self.room:  # a page that is turned to is told of its size, though it is as it was
+            self.post_message(self.Fitted(self))
 
     def render_line(self, y: int) -> Strip:
         if self._width != self.room.width:  # drawn before it is told of its new size: right at once, not twice
