@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from care_core.configs.driven import option_value
 from care_core.records import Struct, field
+from care_core.report.axes import round_step
 from care_core.run import Setting
 from care_core.variables import Variable
 
@@ -72,12 +73,17 @@ def nudged(option: Variable, value: float, by: int) -> float:
         return float(by > 0)
     low, high = option.range or (value - abs(value or 1.0), value + abs(value or 1.0))
     if option.is_log_scaled and value > 0:
-        moved = value * (high / low) ** (by / NUDGES)
+        moved = _rounded(value * (high / low) ** (by / NUDGES), value)
     else:
-        moved = value + by * (high - low) / NUDGES
+        moved = value + by * round_step((high - low) / NUDGES)
     if option.type == "int" and abs(moved - value) < 1:
         moved = value + by
     return option.snap(moved)
+
+
+def _rounded(moved: float, value: float) -> float:
+    """The value in as few digits as tell it from the one before."""
+    return next((short for digits in (2, 3) if (short := float(f"{moved:.{digits}g}")) != value), moved)
 
 
 def parsed(option: Variable, text: str) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from care_core.files import read_small_text
@@ -181,8 +181,9 @@ def at_home(typed: str) -> Path:
     return Path(os.path.expanduser(typed))
 
 
-def entries(typed: str) -> list[Path]:
-    """Folders and logs that the typed path could go on with, folders first; hidden ones only when asked for."""
+def entries(typed: str, accepts: Callable[[Path], bool]) -> list[Path]:
+    """Folders, and what is accepted, that the typed path could go on with, folders first; hidden ones only when asked
+    for."""
     path = as_path(typed)
     folder, start = (path, "") if typed.endswith("/") else (path.parent, path.name.casefold())
     try:
@@ -193,9 +194,14 @@ def entries(typed: str) -> list[Path]:
         entry
         for entry in inside
         if entry.name.casefold().startswith(start) and (start.startswith(".") or not entry.name.startswith("."))
-        if os.path.isdir(entry) or is_openable(entry)
+        if os.path.isdir(entry) or accepts(entry)
     ]
-    return sorted(found, key=lambda entry: (is_openable(entry), entry.name.casefold()))
+    return sorted(found, key=lambda entry: (accepts(entry), entry.name.casefold()))
+
+
+def is_no_log(path: Path) -> bool:
+    """Whether this is a file that may be a configuration: it is no log."""
+    return os.path.isfile(path) and not is_openable(path)
 
 
 def is_openable(path: Path) -> bool:

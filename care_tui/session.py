@@ -29,6 +29,8 @@ class Session(Struct, eq=False):
     progress: tuple[str, float] | None = None
     case: Case | None = None
     error: CareError | None = None
+    not_remembered: CareError | None = None
+    """Why the diagnosis could not be put into the history."""
     looked_at: str | None = None
     """The objective that the operator was at when the log was asked to be judged again."""
     objective: int = 0

@@ -129,8 +129,8 @@ def with_flags(settings: Settings, *, ascii: bool, mouse: bool, color: str | Non
 
 
 FPS = 500
-"""Frames a second at most. A key waits for one or two ticks of the screen's timer, which runs while there is something to
-draw: with Textual's 60 they are most of what it waits for. A terminal that is slower is waited for (`link`)."""
+"""Frames a second at most. A key waits for one or two ticks of the screen's timer, which runs while there is something
+to draw: with Textual's 60 they are most of what it waits for. A terminal that is slower is waited for (`link`)."""
 SSH_FPS = 30
 """Over SSH, where a terminal that answers is waited for anyway (`link`): for one that does not."""
 _TEXTUAL_COLORS = {"truecolor": "truecolor", "256": "256", "16": "standard"}

@@ -13,6 +13,7 @@ from care_core.diagnose.implied import implied
 from care_core.diagnose.limits import limits_of
 from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
 from care_core.diagnose.reference import Good, Reference, reference_of
+from care_core.diagnose.verdict import fault_sentence
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import NOTHING_SEEN, Finding, Health
 from care_core.errors import NoRepeatsError, UsageError, nearest
@@ -23,7 +24,6 @@ from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import Record, field, replace
 from care_core.run import OutcomeCheck, Run, Setting, Unavailable, Value, is_known
-from care_core.text import log_time
 from care_core.variables import Role, Threshold, Variable
 
 _YES = Threshold("==", 1.0)
@@ -130,12 +130,12 @@ def found_in(health: Health, run: Run) -> tuple[Finding, ...]:
 def verdict(judged: Judged, findings: Sequence[Finding] = ()) -> MissionVerdict:
     """What became of a mission, in short: what was broken or found critical, else why it could not be judged."""
     everything = (*judged.results, *judged.checks)
-    broken = dict.fromkeys(result.sentence for result in everything if result.status == "fault")
-    if judged.run.mission.count > 1 and not broken:
-        critical = (one for one in findings if one.severity == "critical" and not one.after_impact)
-        broken = dict.fromkeys(f"{one.title} at {log_time(one.onset_s)}" for one in critical)
-    if broken:
-        return MissionVerdict(judged.run.mission, "fault", "; ".join(broken), everything)
+    is_broken = any(result.status == "fault" for result in everything)
+    is_one_of_many = judged.run.mission.count > 1
+    critical = any(one.severity == "critical" and not one.after_impact for one in findings)
+    if is_broken or (is_one_of_many and critical):
+        told = fault_sentence(everything, findings if is_one_of_many else ())
+        return MissionVerdict(judged.run.mission, "fault", told, everything)
     unknown = [result for result in everything if result.status == "not_evaluated"]
     if not judged.results and not unknown:
         return MissionVerdict(judged.run.mission, "not_evaluated", "what could be judged is OK", everything)

@@ -357,7 +357,7 @@ def _failed(
 ) -> str:
     """`where`: of which run nothing was found, where another of the log failed."""
     if status == "fault":
-        return _fault(objectives, findings)
+        return fault_sentence(objectives, findings)
     unknown = [one for one in objectives if one.status == "not_evaluated"]
     if fit == "no" and len(unknown) == len(objectives):
         return why_unjudged(findings)
@@ -412,7 +412,7 @@ _CAME_DOWN = ("control was lost at ", "it hit the ground at ")
 """How a shortfall begins of which a finding tells more."""
 
 
-def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding]) -> str:
+def fault_sentence(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding]) -> str:
     """What was missed, and the first critical findings: as much of it as two lines hold."""
     broken = list(dict.fromkeys(one.sentence for one in objectives if one.status == "fault"))
     is_refused = any("arming was refused" in sentence for sentence in broken)

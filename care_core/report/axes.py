@@ -31,7 +31,7 @@ _STEPS_OF_TIME = (
 
 def value_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
     """About so many round values between two others."""
-    step = _nice((high - low) / most)
+    step = round_step((high - low) / most)
     first = math.ceil(low / step)
     return tuple(float(f"{i * step:.12g}") for i in range(first, math.floor(high / step) + 1))
 
@@ -39,7 +39,7 @@ def value_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
 def time_ticks(start_s: float, end_s: float, most: int) -> tuple[float, ...]:
     """At most so many round times, in seconds of the log."""
     span = max(end_s - start_s, 1e-9)
-    step = next((step for step in _STEPS_OF_TIME if span / step <= most), _nice(span / most))
+    step = next((step for step in _STEPS_OF_TIME if span / step <= most), round_step(span / most))
     return tuple(round(i * step, 6) for i in range(math.ceil(start_s / step), math.floor(end_s / step) + 1))
 
 
@@ -48,7 +48,7 @@ def tick_time(time_s: float) -> str:
     return seconds(time_s) if abs(time_s) >= LONG_S else f"{time_s:g}"
 
 
-def _nice(step: float) -> float:
+def round_step(step: float) -> float:
     """The next round number: 1, 2, 2.5 or 5 times a power of ten."""
     power = float(10.0 ** math.floor(math.log10(step)))
     return next(nice * power for nice in _STEPS if nice * power >= step * (1 - 1e-9))

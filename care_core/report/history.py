@@ -237,7 +237,11 @@ def _robot_lines(robot: RobotRunsEntry, ascii: bool, everything: bool) -> Iterat
     is_shared = robot.robot is not None and (not robot.robot.is_sure or robot.robot.is_simulated)
     doubt = ", others may share it" if is_shared else ""
     faulty = "none" if not robot.faulty else f"{robot.faulty} of them"
-    yield from wrapped(f"{name} ({source}{doubt}): {number_of(robot.runs, 'run')}, {faulty} with a fault")
+    head = f"{name} ({source}{doubt}): {number_of(robot.runs, 'run')}, {faulty} with a fault"
+    if robot.robot is None:
+        yield from wrapped(f"{head}; no trends, for they may be of several robots")
+        return
+    yield from wrapped(head)
     missions = [(n, one) for n, one in enumerate(robot.missions, 1) if everything or not _is_thin(one.trends)]
     width = max(len(trend.objective) for trend in (robot.faults, *(t for _, one in missions for t in one.trends)))
     yield from _trend_lines(robot.faults, "  ", width + 2, ascii)
@@ -252,7 +256,7 @@ def _robot_lines(robot: RobotRunsEntry, ascii: bool, everything: bool) -> Iterat
 
 def _trend_lines(trend: TrendEntry, indent: str, width: int, ascii: bool) -> Iterator[str]:
     values = trend.values
-    span = "" if not values else f", {_span(min(values), max(values), trend.unit)}"
+    span = "" if not values else f", {_between(min(values), max(values), trend.unit)}"
     said = {
         "too few": f"{number_of(len(values), 'value')}{span}: needs {LEAST_RUNS} runs to show a trend",
         "constant": f"always {_figure(values[0], trend.unit)}" if values else "",
@@ -266,7 +270,8 @@ def _trend_lines(trend: TrendEntry, indent: str, width: int, ascii: bool) -> Ite
     if trend.since is not None:
         since = trend.since
         when = since.at[:16].replace("T", " ")
-        moved = f"{_span(since.before, since.after, trend.unit)} since {when}, {Path(since.log).name} (p {_p(since.p)})"
+        moved = f"from {_figure(since.before, '')} to {_figure(since.after, trend.unit)}"
+        moved += f" since {when}, {Path(since.log).name} (p {_p(since.p)})"
         shown = [f"{one.name} {_value(one.from_)} -> {_value(one.to)}" for one in since.changed[:_CHANGES]]
         more = len(since.changed) - len(shown)
         others = f" and {more} more" if more else ""
@@ -274,8 +279,8 @@ def _trend_lines(trend: TrendEntry, indent: str, width: int, ascii: bool) -> Ite
         yield from wrapped(f"{moved}; {what}", first=indent + "  ")
 
 
-def _span(low: float, high: float, unit: str) -> str:
-    return _figure(high, unit) if low == high else f"{low:.4g} to {_figure(high, unit)}"
+def _between(low: float, high: float, unit: str) -> str:
+    return _figure(high, unit) if low == high else f"between {low:.4g} and {_figure(high, unit)}"
 
 
 def _figure(value: float, unit: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -20,11 +19,11 @@ from care_tui.copying import copy
 from care_tui.pages.figured import LEAST_FIGURE
 from care_tui.pages.page import View, enter_to, sentence
 from care_tui.pages.proven import ProvenPage
-from care_tui.places import as_path
+from care_tui.places import is_no_log
 from care_tui.render.fix import about_rows, no_fix_rows
-from care_tui.render.rows import Row, Rows, command_rows, diff_rows, error_rows, heading, percent, warning
+from care_tui.render.rows import Row, Rows, command_rows, diff_rows, error_rows, heading, labelled, percent, warning
 from care_tui.screens.confirm import Confirm
-from care_tui.screens.prompt import Prompt
+from care_tui.screens.file_dialog import FileDialog
 
 SIDES: dict[DiffSide, str] = {
     "driven": "As driven (-) against the change (+)",
@@ -35,12 +34,6 @@ TURNS: dict[DiffSide, str] = {"driven": "As driven", "file": "My file", "changed
 """What a key says that turns to each."""
 HELD = "The file holds these values already: there is nothing to put into it."
 DIFF, APPLY, DOUBTS = "diff", "apply", "doubts"
-
-
-def _not_a_file(typed: str) -> str:
-    """What is wrong with the name of a configuration file; empty where nothing is."""
-    path = as_path(typed.rpartition("=")[2])
-    return "" if os.path.isfile(path) else "There is no such file."
 
 
 class DiffPage(ProvenPage):
@@ -60,6 +53,8 @@ class DiffPage(ProvenPage):
         Binding("c", "copy_diff", "Copy", id="diff.copy"),
     ]
     side: DiffSide = "driven"
+    _told: tuple[str, ...] = ()
+    """What was written last, and where what it was before is."""
 
     def enter(self) -> None:
         self.forget(DIFF)
@@ -86,7 +81,8 @@ class DiffPage(ProvenPage):
             return View(title, lambda _: error_rows(answer))
         if isinstance(answer, tuple):
             diff, commands, doubts = answer
-            notes = [warning("File", clean(doubt)) for doubt in doubts]
+            notes = [labelled("Written", told) for told in self._told if self.side == "file"]
+            notes += [warning("File", clean(doubt)) for doubt in doubts]
             rows = [*notes, *diff_rows(diff or "No difference.\n").rows, *command_rows(commands)]
             return View(title, lambda _: Rows([*rows, *self._shown_by(rows)]))
         if session.basket.ticked and session.fix_error is not None:
@@ -157,19 +153,15 @@ class DiffPage(ProvenPage):
 
     def _ask_for_file(self, *, to_apply: bool = False) -> None:
         title = "Apply to which file?" if to_apply else "Compare with which file?"
-        hint = "The robot's configuration, for ROS also NAMESPACE=FILE. Enter takes it, Esc cancels."
-        self.app.push_screen(
-            Prompt(title, f"{Path().absolute()}/", hint, _not_a_file), lambda typed: self._named(typed, to_apply)
-        )
+        dialog = FileDialog(title, Path(), is_no_log, self.glyphs, has_namespace=True)
+        self.app.push_screen(dialog, lambda typed: self._named(typed, to_apply))
 
     def _named(self, typed: str | None, to_apply: bool) -> None:
         if typed is None or self.session.case is None:
             return
-        namespace, sign, path = typed.rpartition("=")
-        name = f"{namespace}{sign}{as_path(path)}"
-        self.session.case = replace(self.session.case, configs=(name,))
+        self.session.case = replace(self.session.case, configs=(typed,))
         if self.workspace.request is not None:
-            self.workspace.request = replace(self.workspace.request, configs=(name,))
+            self.workspace.request = replace(self.workspace.request, configs=(typed,))
         self._turn("file")
         if to_apply:
             self.action_apply()
@@ -222,8 +214,9 @@ class DiffPage(ProvenPage):
             self.say(str(answer))
         elif isinstance(answer, list):
             self.workspace.written += [file for file, _ in answer]
-            told = "; ".join(f"wrote {clean(str(file))}, the old one is {backup.name}" for file, backup in answer)
-            self.say(told or HELD)
+            self._told = tuple(f"wrote {file}, the old one is {backup.name}" for file, backup in answer)
+            if not answer:
+                self.say(HELD)
             self._turn("file")
 
     def _ask_to_apply(self, answer: object) -> None:

@@ -81,6 +81,8 @@ class HistoryPage(FiguredPage):
         return found if isinstance(found, list) else []
 
     def _show(self, runs: list[Past]) -> View:
+        if not runs and (problem := self.session.not_remembered) is not None:
+            return View(Content("History"), lambda _: error_rows(problem))
         if not runs:
             nothing = "No run was triaged before: 'care triage' and this app remember those they judge."
             return View(Content("History"), lambda _: sentence(nothing))

@@ -24,9 +24,9 @@ from care_core.text import clean, number_of
 from care_tui.engine import CancelledError, as_care_error
 from care_tui.messages import Judge, OpenLog
 from care_tui.pages.page import Page, View, enter_to
-from care_tui.places import LogFile, found_logs, named, short
+from care_tui.places import LogFile, found_logs, is_openable, named, short
 from care_tui.render.rows import Row, Rows, by_options, error_rows, labelled, status, text, without_middle
-from care_tui.screens.open_log import OpenLogDialog
+from care_tui.screens.file_dialog import FileDialog
 from care_tui.session import Session
 from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
@@ -239,11 +239,11 @@ class LogsPage(Page):
     def action_pick(self) -> None:
         """Ask for the path of a log."""
         start = self.session.path.parent if self.session.path else self.workspace.folder or Path()
-        self.app.push_screen(OpenLogDialog(start, self.glyphs), self._picked)
+        self.app.push_screen(FileDialog("Open a log", start, is_openable, self.glyphs), self._picked)
 
-    def _picked(self, path: Path | None) -> None:
+    def _picked(self, path: str | None) -> None:
         if path is not None:
-            self.post_message(OpenLog(path))
+            self.post_message(OpenLog(Path(path)))
 
     def action_again(self) -> None:
         """Read the log again, after an error or a change."""

@@ -25,6 +25,8 @@ from care_tui.workspace import Workspace
 NAME_WIDTH = 14
 LEAST_CHANNEL = 6
 """Cells in which a shortened channel still says something."""
+AROUND = 3
+"""Lines around a plot: what it is, what happened, and its times."""
 MOST_TOLD = 6
 """Marks that are told below a plot."""
 SHORTEST_S = 0.5
@@ -49,7 +51,8 @@ class PlotsPage(Page):
     HELP = (
         "Signals of the log, those first that prove what the cursor was on; what was wanted has a colour of its own, "
         "and the time of the finding is shaded. + and - draw less and more of the time around the moment, n goes to "
-        "the next mark, x keeps a signal beside the others, Enter leads to the messages of the moment. / filters."
+        "the next mark, x keeps a signal in view below the others, as many as there is room for, Enter leads to the "
+        "messages of the moment. / filters."
     )
     FITS = True
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -83,7 +86,7 @@ class PlotsPage(Page):
         self._span: Span = (0.0, 1.0)
         self._moment: float | None = None
         self._subject: Subject | None = None
-        self._beside: Signal | None = None
+        self._kept: list[Signal] = []
         self._marks = marks_of(case.diagnosis)
 
     # What is drawn
@@ -124,7 +127,7 @@ class PlotsPage(Page):
         return View(title, lambda i: self._detail(None if i is None else signals[i], proof), listing)
 
     def _item(self, signal: Signal, width: int) -> Content:
-        mark = f"{self.glyphs.root if signal == self._beside else ' '} "
+        mark = f"{self.glyphs.root if signal in self._kept else ' '} "
         name = signal_name(signal, width - len(mark), self.glyphs)
         line = Content(mark) + padded(name, NAME_WIDTH, "bold")
         if signal.wanted_name:
@@ -135,13 +138,12 @@ class PlotsPage(Page):
         if signal is None:
             return Rows([])
         width, height = self.reader.room
-        shown = [signal] if self._beside in (None, signal) else [signal, self._beside]
+        shown = [signal, *(one for one in self._kept if one != signal)][: self._most]
         told = self._told(max(height - len(shown) * (LOWEST + 6), 0))
         each = (height - len(told)) // len(shown)
         rows: list[Row] = []
         for one in shown:
-            assert one is not None
-            figure = self._figure(one, proof, width)
+            figure = self._figure(one, proof, width, has_legend=not told)
             if isinstance(figure, CareError):
                 rows += error_rows(figure).rows
             elif figure is None:
@@ -150,11 +152,18 @@ class PlotsPage(Page):
                 rows += figure.rows(width, each, self.glyphs)
         return Rows([*rows, *mark_rows(told, self.glyphs)])
 
-    def _figure(self, signal: Signal, proof: Proof, width: int) -> Figure | CareError | None:
+    @property
+    def _most(self) -> int:
+        """Signals that can be drawn one below the other."""
+        return max(self.reader.room.height // (LOWEST + AROUND), 1)
+
+    def _figure(self, signal: Signal, proof: Proof, width: int, *, has_legend: bool) -> Figure | CareError | None:
         columns, span, case = dots_across(max(width - AXIS, 10), ascii=self.glyphs is ASCII), self._span, self._case
         question = f"{signal.name} {span} {columns} {proof.start_s}"
         found = self.fetched(question, lambda: figure_of(case, signal, proof, span, columns))
-        return replace(found, cursor_s=self._moment) if isinstance(found, Figure) else found
+        if not isinstance(found, Figure):
+            return found
+        return replace(found, cursor_s=self._moment, has_legend=has_legend)
 
     def _told(self, room: int) -> list[Mark]:
         """Marks in words as far as there is room: those around the moment, else the gravest."""
@@ -192,19 +201,35 @@ class PlotsPage(Page):
         if not self._marks:
             self.say("Nothing is marked in this log.")
             return
-        here = -math.inf if self._moment is None else self._moment
+        here = self._start if self._moment is None else self._moment
         mark = next((mark for mark in self._marks if mark.time_s > here), self._marks[0])
         self._moment = mark.time_s
         if self._span[0] <= mark.time_s <= self._span[1]:
             self.show()
         else:
             self._draw_around(mark.time_s, (self._span[1] - self._span[0]) / 2)
-        self.say(f"{seconds(mark.time_s)}  {mark.words}")
+        if self._kept:  # else it is told below the plot
+            self.say(f"{seconds(mark.time_s)}  {mark.words}")
+
+    @property
+    def _start(self) -> float:
+        """Where marks are looked for from: the end of the finding that is shown, else the beginning of what is
+        drawn."""
+        found = self._answers.get(PROOF)
+        end_s = found.end_s if isinstance(found, Proof) else None
+        return math.nextafter(self._span[0], -math.inf) if end_s is None else end_s
 
     def action_keep(self) -> None:
-        """Keep the signal under the cursor in view beside the others, or let it go."""
+        """Keep the signal under the cursor in view below the others, or let it go; the one that was kept first goes
+        where there is no room for one more."""
         found = self._answers.get(PROOF)
-        if isinstance(found, Proof) and self.index is not None:
-            here = found.signals[self.index]
-            self._beside = None if here == self._beside else here
-            self.show()
+        if not isinstance(found, Proof) or self.index is None:
+            return
+        here, most = found.signals[self.index], self._most - 1
+        if here in self._kept:
+            self._kept.remove(here)
+        elif most:
+            self._kept = [*self._kept, here][-most:]
+        else:
+            self.say("There is no room for a second plot.")
+        self.show()

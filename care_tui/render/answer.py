@@ -20,6 +20,8 @@ _FITS = "profile fits"
 _MARK = "! "
 _NARROW = 70
 """Cells below which a reason is told beyond the edge."""
+_STANDS_OUT = 0.25
+"""Probability below which the likeliest explanation is one of many."""
 _LEAST = 12
 """Cells that are left of a change, however narrow the terminal."""
 
@@ -66,11 +68,13 @@ def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: b
         first = hypotheses[0]
         doubt = "  weak training support" if _is_doubtful(diagnosis, first) else ""
         found = [one for one in every_finding(diagnosis.health.findings) if one.title == first.name]
+        lead = "" if first.probability >= _STANDS_OUT else "nothing stands out; likeliest is "
         yield (
             _labelled("Cause")
             + bar(first.probability, glyphs)
             + Content.assemble(
                 (f" {percent(first.probability):>5}  ", "bold"),
+                lead,
                 text(hypothesis_text(first, found, diagnosis.outside), "bold"),
                 (doubt, "$text-warning"),
             )

@@ -115,18 +115,20 @@ _SIGNS = {
     "crash": "C",
     "failsafe": "F",
     "error": "E",
-    "arming": "A",
     "mode": "M",
     "goal": "G",
     "recovery": "R",
     "parameter": "P",
-    "flight": "T",
     "info": "i",
 }
+_SIGNS_OF_WORDS = {"armed": "A", "disarmed": "D", "took off": "T", "highest": "H", "landed": "L"}
+"""Of moments of one kind that are each other's opposites, by how they begin."""
 
 
 def sign_of(mark: Mark, glyphs: Glyphs) -> str:
     """What happened as a sign on the axis of time."""
+    if mark.kind in ("arming", "flight"):
+        return next((sign for words, sign in _SIGNS_OF_WORDS.items() if mark.words.startswith(words)), "!")
     return glyphs.fault if mark.kind == "critical" else _SIGNS.get(mark.kind, "!")
 
 

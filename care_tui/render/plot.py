@@ -26,6 +26,8 @@ AXIS = 9
 """Cells for the numbers left of a plot, with a gap."""
 LOWEST = 4
 """Lines of a plot at least."""
+LOWEST_WITH_LEGEND = 10
+"""Lines of a plot with what stands around it, from which on one is left for what the signs on its axis mean."""
 Column = tuple[float, float] | None
 Cells = tuple[int, int]
 
@@ -155,11 +157,14 @@ class Figure(Record):
     end_s: float | None = None
     """The time of the finding that it shows."""
     cursor_s: float | None = None
+    has_legend: bool = True
+    """Whether the signs on the axis are told below it, where there is room."""
 
     def rows(self, width: int, height: int, glyphs: Glyphs) -> list[Row]:
         """The figure in so many cells: what it is, the plot, what happened, and the axis of time."""
         trace, wide = self.trace, max(width - AXIS, 10)
-        high = max(height - 3, LOWEST)
+        legend = self._legend(width, glyphs) if self.has_legend and height >= LOWEST_WITH_LEGEND else []
+        high = max(height - 3 - len(legend), LOWEST)
         span = self._span(wide)
         cursor = None if self.cursor_s is None else self._place(self.cursor_s, wide)
         lines = plot(
@@ -170,7 +175,7 @@ class Figure(Record):
         labels = value_labels(trace.low, trace.high, high)
         rows = [Row(cut(self._head(glyphs), width, glyphs))]
         rows += [Row(Content.styled(f"{labels.get(y, ''):>{AXIS - 1}} ", "dim") + line) for y, line in enumerate(lines)]
-        return [*rows, Row(self._signs(wide, span, glyphs)), Row(self._times(wide))]
+        return [*rows, Row(self._signs(wide, span, glyphs)), Row(self._times(wide)), *legend]
 
     def _head(self, glyphs: Glyphs) -> Content:
         unit = f", {self.meaning.unit}" if self.meaning.unit else ""
@@ -181,12 +186,29 @@ class Figure(Record):
         sign, why = ". " if glyphs is ASCII else "", "beside" if self.signal.is_beside else "wanted"
         return head + Content.styled(f"  {sign}{clean(self.signal.wanted_name)} ({why})", WANTED)
 
+    @property
+    def _drawn(self) -> list[Mark]:
+        """The marks in the time that is drawn."""
+        return [mark for mark in self.marks if self.trace.start_s <= mark.time_s <= self.trace.end_s]
+
+    def _legend(self, width: int, glyphs: Glyphs) -> list[Row]:
+        """What each sign on the axis means, by the first of its kind; the gravest first, as far as they fit."""
+        first: dict[str, Mark] = {}
+        for mark in sorted(self._drawn, key=lambda mark: mark.rank):
+            first.setdefault(sign_of(mark, glyphs), mark)
+        line = f"{'':>{AXIS - 2}}"
+        for sign, mark in first.items():
+            told = f"  {sign} {clean(mark.words)}"
+            if len(line) + len(told) <= width:
+                line += told
+        return [Row(text(line, "dim"))] if line.strip() else []
+
     def _signs(self, wide: int, span: Cells | None, glyphs: Glyphs) -> Content:
         """What happened, and the time of the finding as a line."""
         signs = [" "] * wide
         if span is not None:
             signs[span[0] : span[1] + 1] = glyphs.rule * (span[1] + 1 - span[0])
-        for mark in reversed([mark for mark in self.marks if self.trace.start_s <= mark.time_s <= self.trace.end_s]):
+        for mark in reversed(self._drawn):
             signs[self._place(mark.time_s, wide)] = sign_of(mark, glyphs)
         return Content(f"{'':>{AXIS}}{''.join(signs)}")
 

@@ -358,6 +358,7 @@ class CaseScreen(Screen[None]):
             self._predicted(event.answer)
             return
         answer, problem = event.answer
+        self.session.not_remembered = problem
         await self._diagnosed(answer)
         if problem is not None:
             self.app.notify(clean(problem.message), markup=False)

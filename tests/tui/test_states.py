@@ -15,8 +15,8 @@ from care_core.progress import Progress
 from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.page_names import STEPS, VIEWS
-from care_tui.places import as_path, entries, found_logs, recent_logs, remember
-from care_tui.screens.open_log import OpenLogDialog
+from care_tui.places import as_path, entries, found_logs, is_no_log, is_openable, recent_logs, remember
+from care_tui.screens.file_dialog import FileDialog
 from care_tui.settings import Settings
 from care_tui.threads import DaemonThreads
 from tests.tui import sample_diagnosis as sample
@@ -205,7 +205,7 @@ async def test_o_opens_any_log_by_its_path(make_app: MakeApp, tmp_path: Path) ->
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "1", "o", "o")
-        assert isinstance(app.screen, OpenLogDialog)
+        assert isinstance(app.screen, FileDialog)
         box = app.screen.query_one("Input")
         box.value = f"{tmp_path}/fli"  # type: ignore[attr-defined]
         await settle(pilot, "tab")
@@ -242,7 +242,8 @@ def test_paths_are_read_as_terminals_write_them(tmp_path: Path) -> None:
         assert as_path(f" {typed}\n") == log
     (tmp_path / ".hidden").mkdir()
     (tmp_path / "notes.txt").write_text("x")
-    assert entries(f"{tmp_path}/") == [log]
+    assert entries(f"{tmp_path}/", is_openable) == [log]
+    assert entries(f"{tmp_path}/", is_no_log) == [tmp_path / "notes.txt"]
 
 
 def test_found_logs_are_the_newest_first_with_those_opened_before(tmp_path: Path) -> None:

@@ -12,12 +12,14 @@ from textual.widgets import Input, Static
 
 from care_core.application.case import Case, Request
 from care_core.application.signals import Signal
+from care_core.ecosystems.findings import Event
 from care_core.errors import UsageError
 from care_core.files import bundled
 from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.engine import Engine, open_and_warm
 from care_tui.pages.history import HistoryPage
+from care_tui.pages.messages import folded
 from care_tui.pages.plots import signal_name
 from care_tui.places import remember
 from care_tui.render.plot import dots_across, plot
@@ -29,7 +31,7 @@ from care_tui.widgets.tab_row import TabRow
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
-from tests.tui.test_walk import index, items, shown, side, step_of, text, title, walk
+from tests.tui.test_walk import hints, index, items, shown, side, step_of, text, title, walk
 
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
 needs_sample = pytest.mark.skipif(not SAMPLE.is_file(), reason="the sample is not bundled")
@@ -69,7 +71,8 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         choices = walk(app).page.choices
         assert choices.has_focus, "the list takes the focus when it appears"
         assert choices.index is not None
-        assert choices.index > 1000
+        assert choices.index > 50
+        assert "1207 messages" in title(app)
         assert choices.top > 0, "the moment of failure is in view"
         await settle(pilot, "n", "slash", *"arming")
         assert "arming" in items(app).casefold()
@@ -211,7 +214,7 @@ async def test_the_change_is_put_into_the_file_that_is_asked_for_and_the_old_one
         assert "+LAND_SPEED,40  # slow" in text(app)
         assert file.read_text() == before, "nothing is written unasked"
         await settle(pilot, "A", "y")
-        assert "the old one is robot.param.bak" in app.title
+        assert "the old one is robot.param.bak" in " ".join(text(app).split()), "where it is can still be read"
         await settle(pilot, "A")
         assert not isinstance(app.screen, Confirm), "there is nothing to ask"
         assert "holds these values already" in app.title
@@ -407,3 +410,33 @@ def test_signals_of_a_narrow_list_are_told_apart_by_their_fields() -> None:
     assert all(len(name) <= 30 and name.endswith(field) for name, field in zip(names, fields, strict=True))
     assert signal_name(Signal("battery_status", "voltage_v"), 30, ASCII) == "battery_status voltage_v"
     assert len(signal_name(Signal("a", "long_" * 20), 30, ASCII)) == 30
+
+
+@needs_sample
+async def test_the_next_mark_is_the_one_after_what_is_shown_and_several_signals_are_kept_in_view() -> None:
+    app = real()
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "3", "p")
+        window = title(app).split(", at")[0]
+        await settle(pilot, "n")
+        assert title(app).startswith(f"{window}, at 194.7 s"), "what was drawn is drawn still"
+        await settle(pilot, "x", "j", "x", "j", "j", "x")
+        drawn = [
+            line for line in text(app).splitlines() if line.startswith(("height", "latitude", "speed", "longitude"))
+        ]
+        assert len(drawn) == 3, "each has a plot of its own"
+        await settle(pilot, "x")
+        assert items(app).count("\u25cf") == 2, "and is let go again"
+    app = real()
+    async with app.run_test(size=(80, 20)) as pilot:
+        await settle(pilot, "p", "x")
+        assert "no room for a second plot" in hints(app)
+
+
+def test_what_is_said_running_is_told_once_until_something_else_is_said() -> None:
+    said = [Event(float(i), "event", words, "EV") for i, words in enumerate(["a", "b", "b", "b", "a"])]
+    assert [(one.message.text, one.count, one.end_s) for one in folded(said)] == [
+        ("a", 1, 0.0),
+        ("b", 3, 3.0),
+        ("a", 1, 4.0),
+    ]

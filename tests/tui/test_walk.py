@@ -12,7 +12,7 @@ from threading import Event
 import pytest
 from textual.dom import DOMNode
 from textual.pilot import Pilot
-from textual.widgets import Static
+from textual.widgets import Input, Static
 
 from care_core.application.case import Case
 from care_core.diagnose.records import Circumstance, Diagnosis, Fault, Odds, PathNode
@@ -28,8 +28,8 @@ from care_tui.render.rows import UNICODE
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
 from care_tui.screens.export import ExportDialog
+from care_tui.screens.file_dialog import FileDialog
 from care_tui.screens.help import HelpScreen
-from care_tui.screens.open_log import OpenLogDialog
 from care_tui.screens.prompt import Prompt
 from care_tui.settings import Settings
 from care_tui.widgets.answer_bar import AnswerBar
@@ -242,9 +242,12 @@ async def test_another_file_can_be_named_than_the_one_before(make_app: MakeApp, 
     app = make_app(sample.faulty(), configs=(first,))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "5", "F")
-        assert isinstance(app.screen, Prompt)
-        app.screen.dismiss(str(second))
-        await settle(pilot)
+        assert isinstance(app.screen, FileDialog)
+        app.screen.query_one(Input).value = f"ns={tmp_path}/sec"
+        await settle(pilot, "tab")
+        assert app.screen.query_one(Input).value == f"ns={second}"
+        app.screen.query_one(Input).value = str(second)
+        await settle(pilot, "enter")
         case = walk(app).session.case
         assert case is not None
         assert case.configs == (str(second),)
@@ -567,7 +570,7 @@ async def test_f_turns_the_diff_to_the_file_on_disk(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "5", "f")
-        assert isinstance(app.screen, Prompt), "the file is asked for"
+        assert isinstance(app.screen, FileDialog), "the file is asked for"
 
 
 @pytest.mark.parametrize("key", ["question_mark", "f1"])
@@ -717,7 +720,7 @@ def test_every_binding_has_an_id_and_leaves_reserved_keys_alone() -> None:
         Choices,
         Reader,
         Prompt,
-        OpenLogDialog,
+        FileDialog,
         Confirm,
     )
     for owner in (*owners, *map(page_class, PAGES)):

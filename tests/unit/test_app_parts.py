@@ -171,7 +171,7 @@ def test_ssh_gets_fewer_frames_unless_told_otherwise(monkeypatch: pytest.MonkeyP
         monkeypatch.setenv(name, "")
         monkeypatch.delenv(name)
     prepare_terminal(Settings())
-    assert os.environ.pop("TEXTUAL_FPS") == "120"
+    assert os.environ.pop("TEXTUAL_FPS") == "500"
     monkeypatch.setenv("SSH_CONNECTION", "1.2.3.4 1 5.6.7.8 22")
     prepare_terminal(Settings(color="16"))
     assert os.environ["TEXTUAL_FPS"] == "30"

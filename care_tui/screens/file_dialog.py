@@ -1,8 +1,9 @@
-"""Any log by its path: typing narrows the list down, Enter goes into a folder or opens the log."""
+"""Any file by its path: typing narrows the list down, Enter goes into a folder or takes the file."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
@@ -14,14 +15,19 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
-from care_tui.places import as_path, entries, is_openable
+from care_tui.places import as_path, entries
 from care_tui.render.rows import Glyphs, text
 from care_tui.widgets.choices import Choices, Listing
 from care_tui.widgets.line_input import LineInput
 
 
-class OpenLogDialog(ModalScreen[Path | None]):
-    """A path to type, with what is in its folder below. Answers None when the operator goes back."""
+class FileDialog(ModalScreen[str | None]):
+    """A path to type, with what is in its folder below. Answers None when the operator goes back.
+
+    Args:
+        accepts: whether a path is such a file, or a recording that is a folder.
+        has_namespace: `NAMESPACE=` may stand before the path, as in the answer.
+    """
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "dismiss(None)", "Cancel", id="open.cancel"),
@@ -30,19 +36,26 @@ class OpenLogDialog(ModalScreen[Path | None]):
         Binding("tab", "complete", "Complete", id="open.complete", priority=True),
     ]
 
-    def __init__(self, start: Path, glyphs: Glyphs) -> None:
+    def __init__(
+        self, title: str, start: Path, accepts: Callable[[Path], bool], glyphs: Glyphs, *, has_namespace: bool = False
+    ) -> None:
         super().__init__()
+        self._title = title
         self._start = start.absolute()
+        self._accepts = accepts
         self._glyphs = glyphs
+        self._has_namespace = has_namespace
         self._entries: list[Path] = []
 
     def compose(self) -> ComposeResult:
         box = LineInput(f"{self._start}/", select_on_focus=False, compact=True, classes="box")
         box.cursor_blink = False
+        keys = "Up and Down choose, Tab completes, Enter takes it, Esc goes back"
+        namespace = ". For ROS also NAMESPACE=FILE" if self._has_namespace else ""
         with Vertical(classes="dialog"):
-            yield Static("Open a log", classes="title", markup=False)
+            yield Static(self._title, classes="title", markup=False)
             yield box
-            yield Static("Up and Down choose, Tab completes, Enter opens, Esc goes back", classes="hint", markup=False)
+            yield Static(f"{keys}{namespace}", classes="hint", markup=False)
             yield Choices(self._glyphs, id="entries")
             yield Static(classes="error", markup=False)
 
@@ -55,11 +68,16 @@ class OpenLogDialog(ModalScreen[Path | None]):
         self._list(event.value)
 
     def _list(self, typed: str) -> None:
-        self._entries = entries(typed)
+        self._entries = entries(self._parts(typed)[1], self._accepts)
         shown = self._entries
         self.query_one(Choices).show(
             Listing(len(shown), lambda i, _width: (self._item(shown[i]),), lambda i: shown[i].name), 0
         )
+
+    def _parts(self, typed: str) -> tuple[str, str]:
+        """The namespace with its sign, and the path."""
+        namespace, sign, path = typed.rpartition("=") if self._has_namespace else ("", "", typed)
+        return f"{namespace}{sign}", path
 
     @staticmethod
     def _item(path: Path) -> Content:
@@ -76,17 +94,17 @@ class OpenLogDialog(ModalScreen[Path | None]):
 
     def _put(self, path: Path) -> None:
         box = self.query_one(Input)
-        box.value = f"{path}/" if path.is_dir() else str(path)
+        box.value = f"{self._parts(box.value)[0]}{path}{'/' if path.is_dir() else ''}"
         box.cursor_position = len(box.value)
 
     @on(Input.Submitted)
     def _submit(self, event: Input.Submitted) -> None:
         event.stop()
-        typed = as_path(event.value)
-        index = self.query_one(Choices).index
+        namespace, rest = self._parts(event.value)
+        typed, index = as_path(rest), self.query_one(Choices).index
         path = typed if os.path.isfile(typed) or index is None else self._entries[index]
-        if os.path.isfile(path) or is_openable(path):
-            self.dismiss(path)
+        if os.path.isfile(path) or self._accepts(path):
+            self.dismiss(f"{namespace}{path}")
         elif os.path.isdir(path):
             self._put(path)
         else:
