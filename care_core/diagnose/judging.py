@@ -10,7 +10,7 @@ from care_core.configs.driven import readable, same_value
 from care_core.configs.loading import ConfigFile, resolve
 from care_core.diagnose.as_found import as_found
 from care_core.diagnose.implied import implied
-from care_core.diagnose.limits import limits_of
+from care_core.diagnose.limits import limits_ahead, limits_of
 from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
 from care_core.diagnose.reference import Good, Reference, reference_of
 from care_core.diagnose.verdict import fault_sentence
@@ -237,6 +237,13 @@ def query_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> Coun
         constraints=tuple(one for one in profile.schema.constraints if one.options <= config.keys()),
         assumed=frozenset(option.name for option in profile.schema.options) - frozenset(run.config),
     )
+
+
+def facing_mission(query: CounterfactualQuery, judged: Judged, profile: Profile) -> CounterfactualQuery:
+    """The same for a vehicle that was refused: its mission is still before it, so the odds of a change are those of
+    every limit, also of what this run could not miss."""
+    ahead = limits_ahead(profile.schema, query.model, judged.reference, judged.bounds)
+    return replace(query, thresholds={**judged.bounds, **ahead})
 
 
 def unread_options(schema: Schema, run: Run) -> frozenset[str]:

@@ -60,6 +60,14 @@ def limits_of(run: Run, schema: Schema, model: Model, reference: Reference, fixe
     return Limits(bounds, needs, unknown)
 
 
+def limits_ahead(schema: Schema, model: Model, reference: Reference, fixed: Container[str]) -> dict[str, Threshold]:
+    """The limits that a mission will have which was never begun, for the odds of it: by what its items and the vehicle
+    tell, and the middle of the training runs where they tell nothing."""
+    relative = {one.name: one.relative for one in schema.objectives if one.relative is not None}
+    needs = {name: need_of(name, reference, schema, model) for name in relative if name not in fixed}
+    return {name: limit(relative[name], need) for name, need in needs.items() if need is not None}
+
+
 def need_of(name: str, reference: Reference, schema: Schema, model: Model) -> Need | None:
     """What the reference configuration takes of an objective for this mission; None where nothing tells."""
     if name not in model.outcomes:

@@ -15,10 +15,11 @@ from care_core.diagnose.causes import UNSURE, as_in_fix, as_ranked, causes_of
 from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.failed_run import FailedRun
 from care_core.diagnose.hypotheses import evidence_of_findings, hypotheses_of, hypotheses_without_model
-from care_core.diagnose.judging import Judged, check_wishes, query_of
+from care_core.diagnose.judging import Judged, check_wishes, facing_mission, query_of
 from care_core.diagnose.next_step import again, bench, was_upset
 from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.outside.change import check_first, leading_outside, shown_fix
+from care_core.diagnose.parts import was_refused
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult, OutsideSuspect
 from care_core.diagnose.remarks import notes_of, reference_note
@@ -99,6 +100,8 @@ def diagnose(
     report("ranking the causes", 0.7)
     query = query_of(judged, profile, keep)
     blamed = blame(judged, profile, query, health, good)
+    if was_refused(health.findings):
+        query = facing_mission(query, judged, profile)
     failed = FailedRun(profile, choice, run, query, reference_note(judged), blamed.unranked, health.findings)
     unheard = _unheard(failed, broken, health)
     needs = {one.variable.name: one.need.value for one in judged.results if one.need is not None}

@@ -11,8 +11,9 @@ from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.configs.driven import option_value
 from care_core.diagnose.blame import blame
 from care_core.diagnose.fixes import change_notes, prediction
-from care_core.diagnose.judging import Judged, query_of
+from care_core.diagnose.judging import Judged, facing_mission, query_of
 from care_core.diagnose.noisy_or import NoisyOr
+from care_core.diagnose.parts import was_refused
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import ObjectiveResult, Odds, Prediction
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
@@ -159,6 +160,9 @@ def question(judged: Judged, profile: Profile, choice: ProfileChoice, health: He
     if judged.run.checks:
         raise UsageError("No mission was flown, so no outcome of one can be predicted.", hint=NO_MISSION_HINT)
     query = query_of(judged, profile)
+    failure = blame(judged, profile, query, health).failure if judged.broken else None
+    if was_refused(health.findings):
+        query = facing_mission(query, judged, profile)
     asked = Question(
         profile=choice,
         schema=profile.schema,
@@ -166,7 +170,7 @@ def question(judged: Judged, profile: Profile, choice: ProfileChoice, health: He
         query=query,
         objectives=judged.results,
         lost_by=lost_by(health.findings, is_judged=bool(judged.broken)),
-        failure=blame(judged, profile, query, health).failure if judged.broken else None,
+        failure=failure,
     )
     asked.ask({})  # The mechanisms invert their covariance when first asked, which nobody should wait for at a key.
     return asked
