@@ -41,6 +41,8 @@ UPSETS: frozenset[FindingKind] = frozenset(("attitude", "crash", "motor", "takeo
 """Kinds of findings after which a vehicle may be damaged, or does not do what it is told."""
 AGAIN = "run again"
 REFUSED = "arming was refused: "
+_FAR_AHEAD = 3.0
+"""Times as likely as a pack that failed is what is looked at before it."""
 KEPT = " kept as it is"
 _UPSET_MESSAGES = frozenset(("crash", "thrust"))
 
@@ -207,8 +209,7 @@ def _undone(diagnosis: Diagnosis) -> str:
     leading = first_named(diagnosis.hypotheses)
     named = leading if leading is not None and leading.what == "parameter" else None
     if part is not None and (is_pack(part) or named is None or named.probability <= LIKELY):
-        is_aside = part.severity != "critical" and first is not None and _leads(first) and first.name != part.title
-        return CHARGE if is_pack(part) and not is_aside else ""
+        return CHARGE if is_pack(part) and not _is_aside(part, first, diagnosis.hypotheses) else ""
     if first is not None and first.name == OUTLASTED:
         return LAND_EARLIER
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
@@ -217,6 +218,14 @@ def _undone(diagnosis: Diagnosis) -> str:
     if named is not None and _is_kept(named.name, diagnosis):
         return f"let {named.name} change as well: without it nothing is likely enough"
     return "" if named is None else _set_right(named.name, diagnosis)
+
+
+def _is_aside(part: Finding, first: Hypothesis | None, hypotheses: Sequence[Hypothesis]) -> bool:
+    """Whether another part or circumstance leads so far that a pack which failed is only to be put right beside it."""
+    if first is None or not _leads(first) or first.name == part.title:
+        return False
+    own = max((one.probability for one in hypotheses if one.name == part.title), default=0.0)
+    return part.severity != "critical" or first.probability > _FAR_AHEAD * own
 
 
 def _set_right(name: str, diagnosis: Diagnosis) -> str:

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from care_core.ecosystems.findings import (
     ASKED_SPEED,
     CAME_DOWN,
+    LEANED,
     LOST_SIGHT,
     NO_MISSION,
     NO_POSITION_FOR,
@@ -75,6 +76,11 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         "check the compass's cable, and COMPASS_ parameters for values that are not numbers",
     ),
     (
+        "the estimated attitude is wrong",
+        "see that AHRS_ORIENTATION says how the board is mounted, and let it stand still while it starts, so that it "
+        "calibrates its gyros",
+    ),
+    (
         "the estimator rejects its measurements",
         "find which measurement it rejects: look at GPS, compass, barometer and vibration at that time",
     ),
@@ -82,6 +88,7 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         r"the estimated (height|climb rate) runs away",
         "see what barometer and accelerometers read while it stands, and calibrate these: one of the two is off",
     ),
+    (LEANED, "start level: no roll or pitch, by stick or by a program, before it is in the air"),
     (
         "it tipped over at take-off",
         "see that it stands level and free, and check the motors' order and directions, propellers and landing gear",

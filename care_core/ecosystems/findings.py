@@ -143,9 +143,10 @@ STEERED = "it flew into the ground as steered"
 SPINS = "it spins against its control"
 IDLED = "control was lost with the throttle stick at its bottom"
 STRUCK = "it hit something"
+LEANED = "it was told to lean while it stood, and tipped over"
 BY_STICK = frozenset((STEERED, IDLED))
 """What a pilot's stick brought about."""
-SHOW_WHY = BY_STICK | {STRUCK}
+SHOW_WHY = BY_STICK | {STRUCK, LEANED}
 """Symptoms of which the log does show why."""
 KILLED = "the kill switch cut the motors in the air"
 DROPPED = "it was disarmed in the air, and fell"

@@ -11,12 +11,10 @@ from itertools import combinations
 import numpy as np
 
 from care_core.lint.problems import Entry, LintedFile, Problem
-from care_core.metadata.output_functions import LEFT, MOTORS, RIGHT, STEERING, THROTTLE
+from care_core.metadata.output_functions import LEFT, MOTORS, MOTORS_OF_FRAME, RIGHT, STEERING, THROTTLE
 
 Values = Mapping[str, Entry]
 
-_MOTORS = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 12: 12, 14: 10}
-"""Motors by FRAME_CLASS (AP_MotorsMatrix.cpp)."""
 _HALVES = (
     (THROTTLE, STEERING, "SERVO1_FUNCTION", f"steering ({STEERING})"),
     (STEERING, THROTTLE, "SERVO3_FUNCTION", f"throttle ({THROTTLE})"),
@@ -111,7 +109,7 @@ def _motors(file: LintedFile, values: Values) -> Iterator[Problem]:
     driven = Counter(int(entry.number or 0) for entry in outputs.values())
     is_plane = _whole(values, "Q_ENABLE") == 1
     frame = _whole(values, "Q_FRAME_CLASS" if is_plane else "FRAME_CLASS")
-    wanted = tuple(MOTORS.values())[: _MOTORS.get(frame or 0, 0)]
+    wanted = tuple(MOTORS.values())[: MOTORS_OF_FRAME.get(frame or 0, 0)]
     if not ("MOT_SPIN_ARM" in values or is_plane) or not any(driven[one] for one in wanted):
         return
     missing = [place for place, function in enumerate(wanted, start=1) if not driven[function]]

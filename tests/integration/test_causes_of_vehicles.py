@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import care_core
+from care_core.diagnose.whatif import question
 from care_core.files import bundled
 
 DATA = Path(__file__).parents[1] / "data"
@@ -46,3 +47,17 @@ def test_a_refusal_is_heard_where_training_knows_none(monkeypatch: pytest.Monkey
     assert fix is not None
     assert (fix.shown_by, fix.odds) == ("arming was refused: AHRS: waiting for home", None)
     assert {one.option.name: one.suggested for one in fix.changes} == {"EK3_VELNE_M_NSE": 0.5}
+
+
+def test_the_odds_of_a_refused_vehicle_count_every_limit_of_the_mission_before_it() -> None:
+    """Nothing of that mission could be missed, and an option that makes it slow would still lose it."""
+    case = care_core.triage(DATA / "ardusub_refused.BIN")
+    assert case.reading is not None
+    asked = question(case.reading.judged, case.reading.profile, case.diagnosis.profile, case.diagnosis.health)
+    assert asked.query.thresholds.keys() - case.reading.judged.bounds == {"mission_time", "energy"}
+    fix = case.diagnosis.fix
+    assert fix is not None
+    config = {**asked.query.config, **{one.option.name: one.suggested for one in fix.changes}}
+    as_advised, crawling = asked.query.probability([config, {**config, "WPNAV_SPEED": 8.0}])
+    assert as_advised > 0.8
+    assert crawling < 0.1

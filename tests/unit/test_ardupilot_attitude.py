@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.flights import FAILS_S, Made, first
+from care_core.ecosystems.findings import every_finding
+from tests.flights import END_S, FAILS_S, HEIGHT_M, HOVER, UP_S, Made, first
 
 
 def test_an_attitude_that_does_not_follow() -> None:
@@ -53,3 +54,36 @@ def test_a_heading_that_swings_against_its_control_does_not_spin() -> None:
     made.table["RATE"] = {"R": zero, "P": zero, "RDes": zero, "PDes": zero, "ROut": zero, "POut": zero,
                           "Y": swung, "YDes": zero + 200.0, "YOut": np.where(swung != 0, 0.5, 0.0)}  # fmt: skip
     assert "it spins against its control" not in [one.title for one in made.find()]
+
+
+@pytest.mark.parametrize(("off_deg", "told"), [(25.0, True), (12.0, False)])
+def test_what_goes_over_in_the_last_moment_of_the_log_is_out_of_control(off_deg: float, told: bool) -> None:
+    made = Made()
+    made.rows["ARM"] = made.rows["ARM"][:1]
+    made.table["CTUN"]["ThO"][made.after(UP_S)] = HOVER
+    for table in ("POS", "CTUN"):
+        for field in ("RelHomeAlt", "Alt", "BAlt"):
+            if field in made.table[table]:
+                made.table[table][field][made.after(UP_S + 6)] = HEIGHT_M
+    made.table["ATT"]["Roll"][made.after(END_S - 0.6)] += np.interp(
+        made.t[made.after(END_S - 0.6)], [END_S - 0.6, END_S - 0.1], [2.0, off_deg]
+    )
+    assert ("it was out of control as the log ended" in [one.title for one in every_finding(made.find())]) is told
+
+
+@pytest.mark.parametrize(
+    ("firmware", "roll_deg", "felt", "told"),
+    [
+        ("ArduRover V4.5.4", 60.0, -9.8, True),
+        ("ArduRover V4.5.4", 10.0, -9.8, False),  # a slope, or AHRS_TRIM
+        ("ArduRover V4.5.4", 60.0, -20.0, False),  # what jolts feels more than gravity
+        ("ArduCopter V4.5.4", 60.0, -9.8, False),  # in the air lift is all that it feels
+    ],
+)
+def test_an_attitude_that_gravity_contradicts_is_wrong(firmware: str, roll_deg: float, felt: float, told: bool) -> None:
+    made = Made()
+    made.facts = {"firmware": firmware}
+    made.table["ATT"]["Roll"][made.after(FAILS_S)] = roll_deg
+    for number in ("", "#2"):
+        made.table[f"IMU{number}"]["AccZ"][:] = felt
+    assert ("the estimated attitude is wrong" in [one.title for one in every_finding(made.find())]) is told

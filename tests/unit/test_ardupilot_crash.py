@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from care_core.ecosystems.findings import STRUCK, every_finding
+from care_core.ecosystems.findings import LEANED, STRUCK, every_finding
 from care_core.ecosystems.measures import Mission, find_extractor
 from tests.flights import ARMED_S, DOWN_S, END_S, FAILS_S, HOVER, UP_S, Made, falling, first
 
@@ -208,6 +208,8 @@ def test_what_lies_on_its_back_is_told(firmware: str, mode: float, since_s: floa
     made.facts = {"firmware": firmware}
     made.rows["MODE"] = [(0.0, {"ModeNum": mode})]
     made.table["ATT"]["Roll"][made.after(since_s)] = 175.0
+    for number in ("", "#2"):
+        made.table[f"IMU{number}"]["AccZ"][made.after(since_s)] *= -1
     assert [one.title for one in made.find() if one.kind == "attitude"] == ([title] if title else [])
 
 
@@ -226,3 +228,18 @@ def test_what_lay_on_the_ground_for_long_did_not_end_by_a_later_blow(hit_s: floa
     made.rows["ERR"] = [(50.0, {"Subsys": 12.0, "ECode": 1.0})]
     made.rows["MSG"] = [(hit_s, {"Message": "SIM Hit ground at 9.0 m/s"})]
     assert [one.title for one in every_finding(made.find()) if one.kind == "crash"] == [title]
+
+
+@pytest.mark.parametrize(("asked_deg", "title"), [(26.0, LEANED), (3.0, "it tipped over at take-off")])
+def test_what_stood_again_and_was_told_to_lean_tipped_over(asked_deg: float, title: str) -> None:
+    """It had flown, stood for seconds, and goes over its gear as it fell on its back nothing had struck it."""
+    made = Made()
+    made.rows["ERR"] = [(DOWN_S + 4.5, {"Subsys": 12.0, "ECode": 1.0})]
+    made.table["CTUN"]["ThO"][made.after(DOWN_S, DOWN_S + 2)] = 0.0
+    made.table["CTUN"]["ThO"][made.after(DOWN_S + 2.1, DOWN_S + 5)] = 0.35
+    tips = made.after(DOWN_S + 2.5)
+    made.table["ATT"]["DesPitch"][tips] = asked_deg
+    made.table["ATT"]["Pitch"][tips] = np.minimum(60.0 * (made.t[tips] - DOWN_S - 2.5), 170.0)
+    made.table["IMU"]["AccZ"][made.after(DOWN_S + 4.0, DOWN_S + 4.2)] = -45.0
+    found = every_finding(made.find())
+    assert [one.title for one in found if one.kind in ("crash", "takeoff")] == [title]

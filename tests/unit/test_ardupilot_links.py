@@ -5,9 +5,11 @@ from __future__ import annotations
 import pytest
 
 from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.ardupilot.texts import code_of
 from care_core.ecosystems.findings import every_finding
+from care_core.ecosystems.vehicles.errors import EKF_CHECK, GPS
 from care_core.run import Setting
-from tests.flights import ARMED_S, END_S, FAILS_S, HEIGHT_M, Made, first, flight_of
+from tests.flights import ARMED_S, DOWN_S, END_S, FAILS_S, HEIGHT_M, Made, first, flight_of
 
 
 def leaks(firmware: str, code: float = 0.0, message: str = "") -> list[float | None]:
@@ -85,3 +87,21 @@ def test_a_submarine_that_leaks() -> None:
     assert leaks("ArduSub V4.5.0", message="Leak detector is set up") == []
     assert leaks("ArduSub V4.5.0") == [], "code 0 says that it is over"
     assert leaks("ArduCopter V4.5.0", code=1.0) == []
+
+
+def test_a_failsafe_whose_text_comes_after_its_disarming_was_a_lost_radio() -> None:
+    made = Made()
+    made.rows["MSG"].append((DOWN_S + 5.1, {"Message": "Radio Failsafe - Disarming"}))
+    assert "the radio link was lost" in [one.title for one in every_finding(made.find())]
+
+
+def test_telemetry_tells_in_words_what_a_log_records_of_the_estimator(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Made()
+    made.rows["MSG"] += [(60.0, {"Message": "EKF variance"})]
+    flight = made.flight()
+    assert not flight.errors(EKF_CHECK), "a log has records of its own"
+    monkeypatch.setattr(type(flight), "is_telemetry", True)
+    assert flight.errors(EKF_CHECK) == [(60.0, 2)]
+    assert code_of("GPS Glitch or Compass error", GPS) == 2
+    assert code_of("Glitch cleared", GPS) == 0
+    assert code_of("Reached command #3", GPS) is None

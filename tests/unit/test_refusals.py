@@ -351,3 +351,12 @@ def test_a_refusal_that_is_cut_is_the_one_that_is_told_in_full() -> None:
     assert {one.why for one in in_full(said)} == {"DO_LAND_START set and RTL_AUTOLAND disabled"}
     short = [one for t, text in enumerate(["PreArm: GPS", "PreArm: GPS 1: Bad fix"]) if (one := refusal_of(t, text))]
     assert {one.why for one in in_full(short)} == {"GPS", "GPS 1: Bad fix"}
+
+
+def test_every_motor_that_no_output_drives_is_set_with_the_one_that_is_named() -> None:
+    text, none = "Motors: no SERVOx_FUNCTION set to Motor2", {f"SERVO{n}_FUNCTION": (1.0, 0.0) for n in (2, 3)}
+    finding = refused(text, **none, FRAME_CLASS=(1, 1))
+    assert finding.parameters == ("SERVO2_FUNCTION",), "one stands for the reason"
+    assert finding.wanted == (("SERVO2_FUNCTION", 34), ("SERVO3_FUNCTION", 35)), "the check stops at the first"
+    elsewhere = refused(text, **none, SERVO9_FUNCTION=(35, 0), FRAME_CLASS=(1, 1))
+    assert elsewhere.wanted == (("SERVO2_FUNCTION", 34),), "what another output drives is not missing"

@@ -78,6 +78,8 @@ _REST_S, _REST_M, _ROLLS_MS, _LOW_M = 4.0, 2.0, 3.0, 5.0
 """What hit the ground rests for so long, within so much height, no faster and no higher than this."""
 _HIT_LOST_S = 10.0
 """What left its demand so shortly before it hit the ground, and was not back since, had lost control."""
+_GOING_DEG = 20.0
+"""What is so far off its attitude demand is falling over already."""
 _GRAZES, _GRAZED = 100.0, 0.7
 """m/s^2: a belly landing is as hard at most; and the share of its speed that what touches nothing keeps."""
 _FAST_MS, _STILL = 5.0, 2.0
@@ -526,12 +528,20 @@ class Airborne(Armed):
         lost = self.lost_control_s
         if lost is None:
             return None
-        before = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost]
+        before = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost and not self._was_going(t)]
         just_before = (t for t, felt in before if felt > _SHOCK and t >= lost - _STRUCK_S)
         flown = [(t, felt) for t, felt in before if within(self.airborne, t)]
         moved = self.one("GPS", "Spd")
         hard = (t for t, felt in flown if felt > _HARD * _SHOCK or _stops_at(moved, t))
         return min((*hard, *just_before, *_out_of_the_blue(flown)), default=None)
+
+    def _was_going(self, at: float) -> bool:
+        """Whether it was off its attitude demand already as it was struck: then it fell on what struck it."""
+        if self.lean_error is None:
+            return False
+        t, error = self.lean_error
+        before = error[(t < at) & (t > at - _HIT_LOST_S)]
+        return len(before) > 0 and float(before[-1]) > _GOING_DEG
 
     def _last_followed_s(self, until: float) -> float:
         """When it last followed its attitude demand before a time."""

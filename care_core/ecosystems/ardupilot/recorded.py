@@ -17,7 +17,7 @@ from care_core.ecosystems.ardupilot import held_missions
 from care_core.ecosystems.ardupilot.held_missions import HeldMission
 from care_core.ecosystems.ardupilot.instances import instances, sees_nothing
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded, recorded_as
-from care_core.ecosystems.ardupilot.texts import Refusal, in_full, refusal_of
+from care_core.ecosystems.ardupilot.texts import Refusal, code_of, in_full, refusal_of
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.plausible import sound as without_nonsense
 from care_core.ecosystems.vehicles import Kind, Vehicle, Way, is_simulated, mode_name, mode_number, vehicle_of, way_of
@@ -218,7 +218,9 @@ class Recorded(RunModel):
         return tuple(map(ErrorRecord, known.t.tolist(), *columns))
 
     def errors(self, subsystem: int) -> list[tuple[float, int]]:
-        """Times and codes of the ERR records of a subsystem."""
+        """Times and codes of the ERR records of a subsystem, in telemetry of the texts that say the same."""
+        if self.is_telemetry:
+            return [(t, code) for t, text in self.messages if (code := code_of(text, subsystem)) is not None]
         return [(one.time_s, one.code) for one in self.error_records if one.subsystem == subsystem]
 
     @cached_property

@@ -36,6 +36,8 @@ RECORDED = {
     VIBRATION: re.compile(r"Vibration compensation", re.IGNORECASE),
 }
 """Subsystem of ERR records -> the texts that say the same."""
+_TOLD = 2
+"""Code of a record of which a text tells."""
 
 
 def is_routine(text: str) -> bool:
@@ -90,6 +92,15 @@ def says_what_is_recorded(text: str, subsystem: int) -> bool:
     """Whether a text says no more than an ERR record of this subsystem."""
     known = RECORDED.get(subsystem)
     return known is not None and known.search(text) is not None
+
+
+_OVER = re.compile(r"clear|recover|\boff\b|over$", re.IGNORECASE)
+
+
+def code_of(text: str, subsystem: int) -> int | None:
+    """The code of the ERR record that a text stands for, 0 where it tells that all is well again; None where it stands
+    for none of this subsystem."""
+    return None if not says_what_is_recorded(text, subsystem) else 0 if _OVER.search(text) else _TOLD
 
 
 def mission_item(text: str) -> tuple[int, str] | None:

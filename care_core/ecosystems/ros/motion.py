@@ -42,6 +42,8 @@ where so many of its samples are such, two publishers send in turn. Noise at res
 _OFF_MPS, _FITS = 0.05, 0.2
 """A twist is of the parent frame where it is so far from what its position does as the robot looks, and this share of
 that from what it does as the map lies."""
+_WANDERS_RAD = 0.03
+"""By which a heading that stands wanders in a second at most."""
 _OVER = 3
 """Steps over which that is compared: encoders count in steps of their own."""
 _FEWEST = 3
@@ -94,6 +96,16 @@ class Odometry(Record, eq=False):
     def stands_still(self) -> bool:
         """Whether its position is not filled in: the same to the last digit while its speed makes metres of way."""
         return not np.ptp(self.x) and not np.ptp(self.y) and self.way_by_speed_m > STILL_M
+
+    @property
+    def turned_rad(self) -> float:
+        """How far it turned in all, either way added up, by its heading second by second; what only wanders does not
+        count."""
+        if len(self.t) < _FEWEST:
+            return 0.0
+        each = np.arange(self.t[0], self.t[-1] + _A_SECOND, _A_SECOND)
+        steps = np.abs(np.diff(np.interp(each, self.t, np.unwrap(self.yaw))))
+        return float(steps[steps > _WANDERS_RAD].sum())
 
     def path_m(self, start_s: float = -np.inf, end_s: float = np.inf) -> float:
         """Length of the path of its positions in a time, m."""

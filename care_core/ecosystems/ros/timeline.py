@@ -55,6 +55,8 @@ _MOVES_S = 0.5
 _NAMED = 6
 """Topics or nodes that one moment names."""
 _TEXT = 110
+_ON_THE_SPOT_M, _TURNED_DEG = 0.3, 45.0
+"""A way that is none, and a turn that is worth a word."""
 _URGENT = {2: 0, 3: 1, 1: 2}
 """An error of diagnostics comes before silence, and that before a warning."""
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e-?\d+)?")
@@ -288,7 +290,10 @@ def _driven(odometry: Odometry) -> str:
     if not odometry.tells_speed:
         return f"its positions lie within {odometry.spread_m(0.0):.1f} m; its odometry tells no speed"
     went = odometry.way_by_speed_m if odometry.stands_still else odometry.path_m()
-    return f"drove {went:.1f} m in all, {odometry.fastest_mps:.2f} m/s at most"
+    turned_deg = math.degrees(odometry.turned_rad)
+    on_the_spot = went < _ON_THE_SPOT_M and turned_deg > _TURNED_DEG
+    turned = f", turned {turned_deg:.0f} deg on the spot" if on_the_spot else ""
+    return f"drove {went:.1f} m in all, {odometry.fastest_mps:.2f} m/s at most{turned}"
 
 
 def _times(count: int, last_s: float) -> str:

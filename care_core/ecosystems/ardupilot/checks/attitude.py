@@ -50,6 +50,10 @@ _NEARER = LIMITS.add(
 )
 _OFF_P = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
 _LOST_P = LIMITS.add("probability of a part, control lost", 0.3, "", "a choice: control is lost for many reasons")
+_GOES_DEG = LIMITS.add("error at the last record", 20.0, "deg", "two thirds of ArduCopter's crash check")
+_GOES_BY_DEG = LIMITS.add("by which it grew in the last moment", 10.0, "deg", "a choice: what is held does not grow")
+_MOMENT_S = LIMITS.add("the last moment", 0.6, "s", "a choice: a loss of control takes about a second")
+_LIFTS = LIMITS.add("throttle that lifts", 0.2, "", "a choice: half of a usual hover")
 _AFTER_S = LIMITS.add("attitude looked at after control was lost", 5.0, "s", "a choice: most falls are over by then")
 _OVER_P = LIMITS.add("probability of what lies upside down", 0.5, "", "a choice: it turned, or its board is mounted so")
 LIMITS.add("tilt of what is upside down", UPSIDE_DOWN_DEG, "deg", "a choice: no slope and no wave")
@@ -96,7 +100,7 @@ _OUT_OF_HAND_P = LIMITS.add(
     "",
     "a choice: gains come first, and a part that gives way swings alike",
 )
-_ENOUGH = 10
+_ENOUGH, _FEW = 10, 3
 _GAINS = ("ATC_RAT_", "ATC_ANG_", "INS_GYRO_FILTER", "INS_HNTCH_", "INS_HNTC2_")
 
 
@@ -114,6 +118,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     yield from swung
     if flight.lost_control_s is None and not swung:
         yield from _far(flight)
+    if flight.lost_control_s is None:
+        yield from _going(flight)
     yield from _yaw(flight)
 
 
@@ -130,6 +136,32 @@ def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
         severity="critical",
         evidence=f"the attitude is up to {float(np.max(after)):.0f} deg off its target and does not recover",
         source="ATT; 30 degrees: ArduCopter's crash check",
+        probability=_LOST_P,
+    )
+
+
+def _going(flight: Flight) -> Iterator[Finding]:
+    """A copter that leaves its demand, faster and faster, in the last moment that the log holds."""
+    error, armed = flight.lean_error, flight.armed
+    if error is None or not armed or armed[-1][1] < flight.end_s or error[0][-1] < flight.end_s - _MOMENT_S:
+        return
+    t, off = error
+    last = off[t > t[-1] - _MOMENT_S]
+    is_lifting = flight.throttle is not None and float(flight.throttle[1][-1]) > _LIFTS
+    by_sticks = int(flight.modes_at(t[-1:])[0]) in ACRO
+    if len(last) < _FEW or by_sticks or not is_lifting or last[-1] < _GOES_DEG or last[-1] - last[0] < _GOES_BY_DEG:
+        return
+    yield Finding(
+        kind="attitude",
+        title="it was out of control as the log ended",
+        onset_s=float(t[t > t[-1] - _MOMENT_S][0]),
+        end_s=flight.end_s,
+        severity="critical",
+        evidence=(
+            f"the attitude is {last[-1]:.0f} deg off its target at the last record, and was {last[0]:.0f} deg "
+            f"{_MOMENT_S:g} s before"
+        ),
+        source="ATT",
         probability=_LOST_P,
     )
 

@@ -10,7 +10,7 @@ from care_core.ecosystems.ardupilot.airborne import ACRO, OFF_GROUND_M
 from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import CAME_DOWN, STEERED, STRUCK, UNDRIVEN, Finding
+from care_core.ecosystems.findings import CAME_DOWN, LEANED, STEERED, STRUCK, UNDRIVEN, Finding
 from care_core.ecosystems.vehicles.errors import CRASH_CHECK
 from care_core.logs.base import Wanted
 
@@ -28,6 +28,9 @@ _ANSWERS_S = LIMITS.add("time in which a mode acts on the throttle", 0.5, "s", "
 _FALL_S = LIMITS.add("fall that may have begun in another mode", 2.0, "s", "free fall: 20 m")
 _SINKS_M = LIMITS.add("descent in the second before a mode that is a fall", 0.5, "m", "a choice: a landing is as fast")
 _TIPPED_P = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a choice: order, direction or propellers")
+_LEANS_DEG = LIMITS.add("lean that is asked for on the ground", 12.0, "deg", "a choice: more than a slope to start on")
+_LEANS_S = LIMITS.add("time in which that tips it over", 2.0, "s", "a choice: it goes over its gear in a second or two")
+_LEANED_P = LIMITS.add("probability that this tipped it over", 0.85, "", "a choice: a foot that caught, beside it")
 _BY_STICKS_P = LIMITS.add("probability that the sticks turned it over", 0.5, "", "a choice: in acro they do, or a part")
 _CRASHED_P = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
 _STEERED_P = LIMITS.add("probability that its stick brought it down", 0.9, "", "a choice: it may have been falling")
@@ -50,21 +53,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     elif _tipped(flight, lost if lost is not None else begin):
         if wrong_layout(flight) is not None:
             return  # that says why
-        start = lost if lost is not None else begin
-        yield Finding(
-            kind="takeoff",
-            title="it tipped over at take-off",
-            onset_s=start,
-            end_s=told or start,
-            severity="critical",
-            evidence=(
-                f"never above {_LOW_M:g} m before control was lost; wrong motor order, turning direction or propellers "
-                "show like this"
-            ),
-            source="ATT, height, ERR 12; 30 degrees: ArduCopter's crash check",
-            probability=_TIPPED_P,
-            suspect="operation",
-        )
+        yield _tipped_over(flight, begin, told)
     elif told is not None or said is not None or impact is not None:
         first = min(t for t in (told, said, impact, flight.struck_s) if t is not None)
         is_said = told is not None or said is not None
@@ -96,6 +85,44 @@ def find(flight: Flight) -> Iterator[Finding]:
             suspect="operation" if steered or by_sticks or landing else "world" if title == STRUCK else "hardware",
             probability=_of(flight, title, by_sticks=by_sticks or landing),
         )
+
+
+def _tipped_over(flight: Flight, at: float, told: float | None) -> Finding:
+    """A copter that went over before it had flown: as it was told to lean while it stood, or for the usual reasons of a
+    take-off."""
+    asked_deg = _asked_to_lean(flight, at)
+    low = f"never above {_LOW_M:g} m before control was lost"
+    why = (
+        f"it was told to lean by {asked_deg:.0f} degrees while it stood"
+        if asked_deg is not None
+        else "wrong motor order, turning direction or propellers show like this"
+    )
+    return Finding(
+        kind="takeoff",
+        title="it tipped over at take-off" if asked_deg is None else LEANED,
+        onset_s=at,
+        end_s=max(told or at, at),
+        severity="critical",
+        evidence=f"{low}; {why}",
+        source="ATT, height, ERR 12; 30 degrees: ArduCopter's crash check",
+        probability=_TIPPED_P if asked_deg is None else _LEANED_P,
+        suspect="operation",
+    )
+
+
+def _asked_to_lean(flight: Flight, at: float) -> float | None:
+    """How far a copter was told to lean as it began to tip over, degrees, where that is more than a start on a slope
+    takes and it went over that way; None otherwise."""
+    table = flight.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+    if table is None:
+        return None
+    told = np.hypot(table["DesRoll"], table["DesPitch"])
+    before = (table.t > at - _LEANS_S) & (table.t <= at)
+    ways = table["Roll"] * table["DesRoll"] + table["Pitch"] * table["DesPitch"]
+    if before.sum() < _FEWEST or ways[before][-1] <= 0:
+        return None
+    asked_deg = float(np.median(told[before]))
+    return asked_deg if asked_deg > _LEANS_DEG else None
 
 
 def _of(flight: Flight, title: str, *, by_sticks: bool) -> float:
@@ -165,6 +192,7 @@ def _tipped(flight: Flight, at: float) -> bool:
     if span is None or not flight.is_copter:
         return False
     known, driven = flight.height, flight.throttle
+    span = max(span[0], _last_stood(flight, at) or span[0]), span[1]
     if known is not None:
         t, height = known
         before = height[(t >= span[0]) & (t <= at)]
@@ -175,6 +203,19 @@ def _tipped(flight: Flight, at: float) -> bool:
     t, throttle = driven
     up = t[(t >= span[0]) & (t <= at) & (throttle > _FIRST_THROTTLE)]
     return bool(len(up)) and at - float(up[0]) < _TAKEOFF_S
+
+
+def _last_stood(flight: Flight, at: float) -> float | None:
+    """Until when it stood with its throttle cut before that was last up; None where it did not, or the log does not
+    tell."""
+    if flight.height is None or flight.throttle is None:
+        return None
+    t, throttle = flight.throttle
+    up = t[(t < at) & (throttle > _FIRST_THROTTLE)]
+    if not len(up):
+        return None
+    stood = (t < up[-1]) & (throttle < _FIRST_THROTTLE) & (np.interp(t, *flight.height) < OFF_GROUND_M)
+    return float(t[stood][-1]) if stood.any() else None
 
 
 def _undriven(flight: Flight, at: float) -> bool:

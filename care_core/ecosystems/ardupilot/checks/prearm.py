@@ -74,7 +74,7 @@ def _blaming(finding: Finding, blamed: tuple[Refusing, ...]) -> Finding:
     return replace(
         finding,
         suspect="parameter",
-        parameters=tuple(one.name for one in blamed),
+        parameters=tuple(one.name for one in blamed if not one.is_beside),
         wanted=tuple((one.name, one.wanted) for one in blamed if one.wanted is not None),
         evidence="; ".join((finding.evidence, *(one.words for one in blamed))),
         source="MSG, PARM; what each check reads: AP_Arming",

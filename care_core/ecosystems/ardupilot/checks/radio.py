@@ -23,6 +23,9 @@ _BRIEF_S = LIMITS.add(
     "loss that explains no crash", 1.0, "s", "a choice: a failsafe that is over so soon has moved nothing far"
 )
 _LOST_P = LIMITS.add("probability of a lost link", 0.8, "", "the firmware's own word")
+_TOLD_S = LIMITS.add(
+    "text of a failsafe behind the disarming by it", 0.5, "s", "a choice: texts wait for a link, heartbeats do not"
+)
 _BRIEF_P = LIMITS.add("probability of a brief loss", 0.3, "", "a choice: links drop frames now and then")
 
 
@@ -34,11 +37,12 @@ def find(flight: Flight) -> Iterator[Finding]:
         gone = [t for t, code in told if code > 0]
         gone += [t for t, text in flight.messages if text.casefold().startswith(_WORDS[subsystem]) and
                  "clear" not in text.casefold()]  # fmt: skip
-        gone = sorted(t for t in gone if within(flight.watched, t))
+        watched = [(start, stop + _TOLD_S) for start, stop in flight.watched]
+        gone = sorted(t for t in gone if within(watched, t))
         if not gone:
             continue
         back = [t for t, code in told if code == 0 and t > gone[0]]
-        end = back[0] if back else flight.watched[-1][1]
+        end = back[0] if back else max(flight.watched[-1][1], gone[0])
         away = end - gone[0]
         is_brief = away < _BRIEF_S and not _acted(flight, subsystem, gone[0])
         severity: Severity = "warning" if is_brief or subsystem == GCS_FAILSAFE else "critical"

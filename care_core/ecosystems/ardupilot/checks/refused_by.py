@@ -16,6 +16,7 @@ from care_core.ecosystems.lithium import CHARGED_V, HARMED_V
 from care_core.ecosystems.way_back import way_back
 from care_core.metadata.ardupilot import firmware_default
 from care_core.metadata.causal_map import OF_THIS_VEHICLE, SET_BY_HAND, Role, meaning_of
+from care_core.metadata.output_functions import MOTORS, MOTORS_OF_FRAME, OUTPUTS
 from care_core.metadata.refusals import Must, refusal_reads
 from care_core.run import Setting
 
@@ -47,6 +48,7 @@ _FAR = LIMITS.add(
 _CODES = LIMITS.add("greatest default of a code", 10.0, "", "a choice: another code is another choice, however near")
 _FULL_AT = LIMITS.add("cell that reads full", CHARGED_V, "V", "voltages of lithium polymer cells")
 _NONE_AT = LIMITS.add("cell that no pack has", HARMED_V, "V", "voltages of lithium polymer cells")
+_MOTOR = re.compile(r"no SERVOx_FUNCTION set to Motor(\d+)")
 _RECEIVER = re.compile(r"GPS\d?_TYPE\d?")
 _ANSWERS = 1
 """GPS.Status of a receiver without a fix; below it none is there."""
@@ -66,6 +68,8 @@ class Refusing(NamedTuple):
     probability: float
     is_shown: bool
     """Whether its value alone keeps the check from passing, or the text names it."""
+    is_beside: bool = False
+    """Whether it has to be right as well, of a reason that another one stands for."""
 
 
 class _Held(NamedTuple):
@@ -108,12 +112,27 @@ def refusing(flight: Flight) -> tuple[Refusing, ...]:
     last = standing(flight)
     complaints = dict.fromkeys(one.why for one in last)
     found = [one for why in complaints for one in _behind(flight, why, last[-1].time_s)]
+    others = (each for why in complaints for each in _other_motors(flight, why))
+    found += [one._replace(is_beside=True) for why in others for one in _behind(flight, why, last[-1].time_s)]
     shown = [one for one in found if one.is_shown]
     told = tuple({one.name: one for one in shown or found}.values())
     if len(told) <= MOST or shown:
         return told
     # Of many that are off each is as likely right: a vehicle that is wired so has them so.
     return tuple(one._replace(wanted=None, words=one.words.partition(":")[0]) for one in told)
+
+
+def _other_motors(flight: Flight, why: str) -> Iterator[str]:
+    """What the same refusal would say of the motors behind the one that it names which no output drives either: its
+    check stops at the first."""
+    named = _MOTOR.search(why)
+    if named is None:
+        return
+    frame = flight.setting("Q_FRAME_CLASS") if flight.setting("Q_ENABLE") else flight.setting("FRAME_CLASS")
+    driven = {flight.setting(f"SERVO{n}_FUNCTION") for n in OUTPUTS}
+    for number in range(int(named[1]) + 1, MOTORS_OF_FRAME.get(int(frame or 0), 0) + 1):
+        if MOTORS[number] not in driven:
+            yield f"{why[: named.start(1)]}{number}{why[named.end(1) :]}"
 
 
 def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
