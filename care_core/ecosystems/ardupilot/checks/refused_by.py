@@ -50,8 +50,8 @@ _FULL_AT = LIMITS.add("cell that reads full", CHARGED_V, "V", "voltages of lithi
 _NONE_AT = LIMITS.add("cell that no pack has", HARMED_V, "V", "voltages of lithium polymer cells")
 _MOTOR = re.compile(r"no SERVOx_FUNCTION set to Motor(\d+)")
 _RECEIVER = re.compile(r"GPS\d?_TYPE\d?")
-_ANSWERS = 1
-"""GPS.Status of a receiver without a fix; below it none is there."""
+_OFF, _ANSWERS = 0, 1
+"""GPS_TYPE of a receiver that is switched off; GPS.Status of one without a fix, below it none is there."""
 _SAME = 1e-6
 """Vehicles hold parameters in 32 bits."""
 
@@ -177,7 +177,10 @@ def _is_without(flight: Flight) -> bool:
 
 
 def _unanswered(one: _Held) -> Refusing:
-    """A kind of receiver that was set and that never answered: it, or the receiver; which its operator knows."""
+    """A kind of receiver that was set and that never answered: it, or the receiver; which its operator knows. One that
+    is switched off answers nobody."""
+    if one.value == _OFF and one.default:
+        return _refusing(one, PLAUSIBLE, "which is none", is_shown=True)
     words = f"{one.name} is {one.value:g} (default {one.default:g}), and no receiver answers: check it and its cable"
     return Refusing(one.name, words, None, PLAUSIBLE, is_shown=True)
 
