@@ -24,7 +24,7 @@ from care_core.ecosystems.ros.node_messages import LogMessage, Report
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
-from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SCAN, SUCCEEDED, TWIST, Drive
+from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, RAYS, SCAN, SUCCEEDED, TWIST, Drive
 from tests.ros_samples import (
     ROS2,
     SECOND_NS,
@@ -980,3 +980,22 @@ def test_a_twist_along_the_axes_of_the_map_is_told_and_turned(is_of_parent: bool
     assert told.is_of_parent is is_of_parent
     np.testing.assert_allclose(told.speed, 0.5, atol=1e-6)
     np.testing.assert_allclose(told.sideways, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("nearest_m", "since_s", "told"),
+    [
+        (0.12, FAILS_AT_S, True),
+        (0.12, 0.0, False),  # what the laser sees of its own robot
+        (0.4, FAILS_AT_S, False),
+    ],
+)
+def test_a_robot_that_drives_on_against_what_stands_before_it(
+    tmp_path: Path, nearest_m: float, since_s: float, told: bool
+) -> None:
+    def against(scan: Any, time_s: float) -> None:
+        if time_s >= since_s:
+            scan.ranges[RAYS // 2 - 8 : RAYS // 2 + 8] = nearest_m
+
+    titles = [one.title for one in every_finding(looked_at(changed(SCAN, against), tmp_path).findings)]
+    assert ("it is told to drive on against what stands before it" in titles) is told
