@@ -26,6 +26,7 @@ from care_core.profile.reading import read_schema
 from care_core.profile.schema import Schema
 from care_core.run import Unavailable, Value, is_known
 from care_core.variables import Role
+from tests.flights import DOWN_S, END_S, UP_S, Made, flight_of
 from tests.tables import read
 
 PROFILE = Path(__file__).parents[2] / "profiles" / "arducopter" / "profile.yaml"
@@ -256,6 +257,21 @@ def test_arming_by_events_and_more_than_one_flight() -> None:
     events = table([(5.0, 10), (6.0, 15), (8.0, 11), (10.0, 10), (70.0, 11)], "Id")
     missions = KIND.missions(*read(flight(ARM=None, EV=events), 75.0), SPEC)
     assert [(one.start_s, one.end_s, one.ended) for one in missions] == [(5.0, 8.0, True), (10.0, 70.0, True)]
+
+
+def test_a_log_that_begins_armed_holds_a_flight_whole_where_it_stood_then() -> None:
+    made = Made()
+    made.rows["ARM"] = made.rows["ARM"][1:]
+    del made.rows["MSG"]  # which tells of the arming
+
+    def spans(first_s: float) -> list[tuple[float, float]]:
+        tables = {name: one.where(one.t >= first_s) for name, one in made.tables().items()}
+        shifted = {name: Table(one.t - first_s, one.columns) for name, one in tables.items() if len(one)}
+        flown = flight_of(shifted, made.known, made.facts, END_S - first_s)
+        return [(one.start_s, one.end_s) for one in KIND.missions(flown, shifted, {})]
+
+    assert spans(UP_S - 4.0) == [(0.0, DOWN_S + 5 - (UP_S - 4.0))]
+    assert spans(30.0) == [], "it flew already"
 
 
 def test_refused_arming_is_one_mission_with_the_last_reasons() -> None:

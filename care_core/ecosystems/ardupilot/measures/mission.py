@@ -28,9 +28,13 @@ from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.ardupilot.measures.shortfall import shortfall, tolerance_m
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric, points
+from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import error_kind, error_words
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.run import Evidence, OutcomeCheck, Unavailable
+
+_STANDS_S = 1.0
+"""So long it stands at the start of a log that holds its take-off."""
 
 
 class ArduPilotFlight(MissionKind):
@@ -50,7 +54,8 @@ class ArduPilotFlight(MissionKind):
         armed, disarmed = (
             {one.time_s for one in flight.arm_changes if one.is_armed is state} for state in (True, False)
         )
-        spans = [(start, end, end in disarmed) for start, end in flight.recorded_armed if start in armed]
+        whole = [span for span in flight.recorded_armed if span[0] in armed or _begins_standing(flight, span)]
+        spans = [(start, end, end in disarmed) for start, end in whole]
         if not flight.arm_changes and flight.refusals:
             spans = [(0.0, flight.end_s, True)]
         kept = _sound(flight, tables)
@@ -125,6 +130,12 @@ class UnrecordedArming(ArduPilotFlight):
             Mission(model, kept, start_s, end_s, end_s in disarmed or flight.stands_at_end, spec)
             for start_s, end_s in flight.armed
         )
+
+
+def _begins_standing(flight: Flight, span: Span) -> bool:
+    """Whether a log that begins armed holds the whole of a flight: it stood then, and took off later."""
+    took_off_s = next((start for start, _ in flight.airborne), None)
+    return took_off_s is not None and span[0] + _STANDS_S < took_off_s < span[1]
 
 
 def _sound(flight: Flight, tables: Mapping[str, Table]) -> dict[str, Table]:

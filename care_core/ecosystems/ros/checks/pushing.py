@@ -50,8 +50,8 @@ def find(drive: Drive) -> Iterator[Finding]:
                 end_s=end,
                 severity=drive.severity(start),
                 evidence=(
-                    f"{float(median(ahead[inside])):.2f} m ahead for {end - start:.0f} s, in which it was told to go on "
-                    f"by {way_m:.1f} m"
+                    f"{float(median(ahead[inside])):.2f} m ahead for {end - start:.0f} s, in which it was told to go "
+                    f"on by {way_m:.1f} m"
                 ),
                 source=f"{scans.topic} against {commands.topic}",
                 suspect="world",
