@@ -7,6 +7,7 @@ calibration are left out.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby, pairwise
 
@@ -44,6 +45,8 @@ from care_core.logs.base import Table, Wanted
 from care_core.numbers import Floats
 from care_core.text import listed, log_time, times_until
 
+_UPLOADED = re.compile(r"Flight plan received|New mission|Mission: new", re.IGNORECASE)
+"""What the firmware says of a mission that was uploaded."""
 READS: Wanted = {
     "MSG": ("Message",),
     "MODE": ("ModeNum", "Rsn"),
@@ -356,12 +359,15 @@ def _mission(flight: Flight, items: Sequence[tuple[float, int, str]]) -> Iterato
 
 
 def _replaced(flight: Flight) -> Iterator[Event]:
-    """Each mission that took the place of another."""
+    """Each mission that took the place of another: when the firmware said so, for its items are known only as they are
+    begun where nothing was recorded meanwhile."""
+    said = [t for t, text in flight.messages if _UPLOADED.match(text)]
     for before, held in pairwise(flight.held_missions):
-        when = " while armed" if within(flight.armed, held.since_s) else ""
+        at_s = max((t for t in said if before.since_s < t <= held.since_s), default=held.since_s)
+        when = " while armed" if within(flight.armed, at_s) else ""
         now = counted(len(held.waypoints), "waypoint")
         text = f"another mission was uploaded{when}: {now}, {len(before.waypoints)} before"
-        yield Event(held.since_s, "mission", text if before.items else f"a mission was uploaded{when}: {now}", "CMD")
+        yield Event(at_s, "mission", text if before.items else f"a mission was uploaded{when}: {now}", "CMD")
 
 
 def _ranges(numbers: Sequence[int]) -> str:
