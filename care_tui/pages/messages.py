@@ -25,7 +25,7 @@ NEAR_S = 0.5
 MESSAGES = "messages"
 
 
-class Said(Record):
+class Repeated(Record):
     """A message, and how often it came again at once, until when."""
 
     message: Event
@@ -33,12 +33,12 @@ class Said(Record):
     end_s: float = 0.0
 
 
-def folded(messages: Iterable[Event]) -> list[Said]:
+def folded(messages: Iterable[Event]) -> list[Repeated]:
     """Messages of which one that is said again and again is told once."""
-    said: list[Said] = []
+    said: list[Repeated] = []
     for _, same in groupby(messages, key=lambda message: (message.kind, message.text)):
         first, *others = same
-        said.append(Said(first, 1 + len(others), others[-1].time_s if others else first.time_s))
+        said.append(Repeated(first, 1 + len(others), others[-1].time_s if others else first.time_s))
     return said
 
 
@@ -60,7 +60,7 @@ class MessagesPage(Page):
         found = None if case is None else self.fetched(MESSAGES, lambda: folded(messages_of(case)))
         return view_of("Messages", found, self._show)
 
-    def _show(self, messages: list[Said]) -> View:
+    def _show(self, messages: list[Repeated]) -> View:
         if not messages:
             return View(Content("Messages"), lambda _: sentence("The log holds no message in words."))
         listing = Listing(
@@ -80,7 +80,7 @@ class MessagesPage(Page):
         self._wanted = moment_s
 
     @property
-    def _messages(self) -> list[Said]:
+    def _messages(self) -> list[Repeated]:
         found = self._answers.get(MESSAGES)
         return found if isinstance(found, list) else []
 
@@ -97,25 +97,25 @@ class MessagesPage(Page):
         fits = self.session.diagnosis.profile.fit.verdict != "no"
         return f"; the mission is from {seconds(mission.start_s)} to {seconds(mission.end_s)}" if fits else ""
 
-    def _moment(self, messages: list[Said]) -> int:
+    def _moment(self, messages: list[Repeated]) -> int:
         """The first message that the diagnosis rests on, else the last of the mission."""
         marked = [i for i, one in enumerate(messages) if self._evidence(one)]
         end = self.session.diagnosis.run.mission.end_s
         before = [i for i, one in enumerate(messages) if one.message.time_s <= end]
         return marked[0] if marked else before[-1] if before else 0
 
-    def _evidence(self, one: Said) -> list[str]:
+    def _evidence(self, one: Repeated) -> list[str]:
         """What the diagnosis takes from a message."""
         evidence = self.session.diagnosis.run.evidence
         found = [part for part in evidence if _apart(one, part.time_s) < NEAR_S and part.text in one.message.text]
         points = ((part, f", points at {', '.join(part.options)}" if part.options else "") for part in found)
         return [f"Evidence: {part.kind}{options}{meaning(part)}" for part, options in points]
 
-    def _words(self, one: Said) -> str:
+    def _words(self, one: Repeated) -> str:
         """What `/` searches in: all that is told of a message."""
         return " ".join([one.message.kind, one.message.text, *self._evidence(one)])
 
-    def _item(self, one: Said) -> Content:
+    def _item(self, one: Repeated) -> Content:
         message = one.message
         mark = self.glyphs.here if self._evidence(one) else "!" if message.kind in LOUD else " "
         style = "bold" if mark != " " else ""
@@ -123,7 +123,7 @@ class MessagesPage(Page):
         head = f"{mark} {seconds(message.time_s):>9}  {message.kind:<8} "
         return Content(head) + text(message.text, style) + text(again, "dim")
 
-    def _detail(self, one: Said | None) -> Rows:
+    def _detail(self, one: Repeated | None) -> Rows:
         if one is None:
             return Rows([])
         until = f" ({one.count} times, until {seconds(one.end_s)})" if one.count > 1 else ""
@@ -142,6 +142,6 @@ class MessagesPage(Page):
             self.say("No message is a warning, an error or evidence.")
 
 
-def _apart(one: Said, time_s: float) -> float:
+def _apart(one: Repeated, time_s: float) -> float:
     """Seconds from a message to a moment; none while it was said again and again."""
     return max(one.message.time_s - time_s, time_s - one.end_s, 0.0)

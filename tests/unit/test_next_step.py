@@ -227,10 +227,16 @@ def test_a_battery_that_held_comes_after_what_ended_the_run(severity: Severity, 
     link = Finding("radio", "the radio link was lost", 50.0, 60.0, "critical", "", "", probability=0.9)
     empty = Finding("battery", "the battery was not charged", 0.0, 60.0, severity, "", "", probability=0.9)
     told = (empty, link) if is_pack else (link, empty)
-    ended = replace(failed(*told), hypotheses=(Hypothesis("hardware", link.title, 0.8),))
+    rivals = Hypothesis("hardware", link.title, 0.55), Hypothesis("hardware", empty.title, 0.4)
+    ended = replace(failed(*told), hypotheses=rivals)
     assert (next_step(ended, has_failed=True) == "charge or replace the battery") is is_pack
     if not is_pack:
         assert "check the link's antennas and range" in next_step(ended, has_failed=True)
+    ahead = replace(
+        ended, hypotheses=(Hypothesis("hardware", link.title, 0.8), Hypothesis("hardware", empty.title, 0.1))
+    )
+    assert next_step(ahead, has_failed=True).startswith("check the link's antennas and range"), "what leads by far"
+    assert ("charge or replace the battery" in next_step(ahead, has_failed=True)) is is_pack
 
 
 def test_where_nothing_failed_no_part_is_named() -> None:
