@@ -145,6 +145,8 @@ def test_a_command_of_the_way_back_rounds_no_bitmask() -> None:
     [
         ("SERVO2_MAX is less than SERVO2_TRIM", {"SERVO2_MAX": (1452, 1900), "SERVO2_TRIM": (1500, 1500)},
          "SERVO2_MAX"),
+        ("SERVO2_MAX is less than SERVO2_TRIM", {"SERVO2_MAX": (1450, 1900), "SERVO2_TRIM": (1540, 1500)},
+         "SERVO2_MAX"),  # the other at its default would not be enough
         ("SERVO4_MAX is less than SERVO4_TRIM", {"SERVO4_MAX": (1900, 1900), "SERVO4_TRIM": (2200, 1500)},
          "SERVO4_TRIM"),
         ("Check ACRO_BAL_ROLL/PITCH", {"ACRO_BAL_ROLL": (1, 1), "ATC_ANG_RLL_P": (0.8, 4.5), "ACRO_BAL_PITCH": (1, 1),

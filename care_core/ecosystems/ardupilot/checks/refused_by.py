@@ -149,7 +149,7 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
         name: _setting_of(flight, name, values[name]) for must in broken for name in must.parameters if name in values
     }
     named = [one for one in held if one.name in reads.named]
-    if proven := _at_fault(list(bound.values())) or list(bound.values()):
+    if proven := _enough(_at_fault(list(bound.values())), broken, values) or list(bound.values()):
         sure = PLAUSIBLE if is_outside else PROVEN
         for one in proven:
             only = next((value for must in broken if (value := must.value_of(one.name)) is not None), None)
@@ -189,6 +189,17 @@ def _at_fault(held: Sequence[_Held]) -> list[_Held]:
     """Those that are off their default; all where no default is known."""
     off = [one for one in held if one.is_off]
     return off or [one for one in held if one.default is None]
+
+
+def _enough(held: list[_Held], broken: Sequence[Must], values: Mapping[str, float]) -> list[_Held]:
+    """Those of which each alone, at its default, has the check pass; all where none has."""
+    enough = [
+        one
+        for one in held
+        if one.default is not None
+        and not any(must.is_broken({**values, one.name: one.default}) for must in broken if one.name in must.parameters)
+    ]
+    return enough or held
 
 
 def _asks(one: _Held, broken: Sequence[Must], values: Mapping[str, float]) -> str:
