@@ -290,9 +290,9 @@ def _is_spoken_of(name: str, diagnosis: Diagnosis) -> bool:
 def _looked_at(name: str, diagnosis: Diagnosis) -> str:
     """What to do with a parameter outside the profile that leads and whose change is not advised."""
     refused = (one for one in diagnosis.health.findings if one.kind == "prearm" and name in one.parameters)
-    said = (text for one in refused for text in one.evidence.split("; ") if text.startswith(f"{name} is "))
-    if rule := next(said, ""):
-        return rule  # what the check asks for
+    said = [text for one in refused for text in one.evidence.split("; ") if text.startswith(f"{name} is ")]
+    if said:
+        return said[-1]  # what the check asks for, behind what the firmware says
     setting = diagnosis.run.settings.get(name)
     value = "" if setting is None else f" {shown(setting.value)}"
     meaning = meaning_of(name, vehicle_of_run(diagnosis.run).kind)

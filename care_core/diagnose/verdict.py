@@ -33,6 +33,8 @@ STATUS_WORDS: dict[RunStatus, str] = {
 UNKNOWN_PARAMETER = "a parameter that the profile does not know"
 GUESS = "\u00a0probability\u00a0(a\u00a0guess)"
 NO_LIMIT = "no limit of this mission is known"
+_MEASURED = re.compile(r"\s*\([^)]*\d[^)]*\)")
+"""What a text has in parentheses, with a number."""
 _CLAUSE = re.compile(r"\s*[,;(]")
 """What ends the first clause of a reason."""
 NO_LIMITS = "no limits for time and energy, no causes by parameters"
@@ -309,7 +311,8 @@ def compose(
 def _but_for(headline: str, text: str) -> str:
     """A text without the end that the headline says in the same words."""
     told, clauses = headline.casefold(), text.replace(NOT_READY, "").split(": ")
-    ends = (index for index in range(len(clauses)) if ": ".join(clauses[index:]).casefold() in told)
+    bare = _MEASURED.sub("", told)  # an explanation is told without what was measured
+    ends = (i for i in range(len(clauses)) if (said := ": ".join(clauses[i:]).casefold()) in told or said in bare)
     end = next(ends, None)
     return text if end is None else ": ".join(clauses[:end])
 

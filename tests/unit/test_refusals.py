@@ -362,3 +362,11 @@ def test_every_motor_that_no_output_drives_is_set_with_the_one_that_is_named() -
     assert finding.wanted == (("SERVO2_FUNCTION", 34), ("SERVO3_FUNCTION", 35)), "the check stops at the first"
     elsewhere = refused(text, **none, SERVO9_FUNCTION=(35, 0), FRAME_CLASS=(1, 1))
     assert elsewhere.wanted == (("SERVO2_FUNCTION", 34),), "what another output drives is not missing"
+
+
+def test_a_stick_behind_the_first_four_channels_is_put_back_where_its_own_is_free() -> None:
+    text, others = "Yaw (RC11) is not neutral", {"RCMAP_ROLL": (1, 1), "RCMAP_PITCH": (2, 2), "RCMAP_THROTTLE": (3, 3)}
+    assert refused(text, RCMAP_YAW=(11, 4), **others).wanted == (("RCMAP_YAW", 4),)
+    assert refused(text, RCMAP_YAW=(11, 4), **{**others, "RCMAP_ROLL": (4, 1)}).wanted == (), "of a layout of its own"
+    swapped = refused("Yaw (RC1) is not neutral", RCMAP_YAW=(1, 4), **{**others, "RCMAP_ROLL": (4, 1)})
+    assert swapped.wanted == ()

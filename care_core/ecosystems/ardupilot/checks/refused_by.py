@@ -50,6 +50,7 @@ _FULL_AT = LIMITS.add("cell that reads full", CHARGED_V, "V", "voltages of lithi
 _NONE_AT = LIMITS.add("cell that no pack has", HARMED_V, "V", "voltages of lithium polymer cells")
 _MOTOR = re.compile(r"no SERVOx_FUNCTION set to Motor(\d+)")
 _RECEIVER = re.compile(r"GPS\d?_TYPE\d?")
+_STICKS = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_THROTTLE", "RCMAP_YAW")
 _OFF, _ANSWERS = 0, 1
 """GPS_TYPE of a receiver that is switched off; GPS.Status of one without a fix, below it none is there."""
 _SAME = 1e-6
@@ -166,9 +167,16 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
 def _unproven(flight: Flight, refusing: Refusing, one: _Held) -> Refusing:
     """What a check reads, and nothing shows to be wrong: how a real vehicle is wired and mounted is off the default
     rightly, and its operator looks at it before it is put back."""
-    if flight.is_simulated or one.role not in OF_THIS_VEHICLE:
+    if flight.is_simulated or one.role not in OF_THIS_VEHICLE or _is_beyond_sticks(flight, one):
         return refusing
     return refusing._replace(wanted=None, words=f"{refusing.words.partition(':')[0]}: {way_back(one.name, None, None)}")
+
+
+def _is_beyond_sticks(flight: Flight, one: _Held) -> bool:
+    """Whether a stick is looked for behind the four channels that every transmitter has its sticks on, and its own is
+    free."""
+    others = {name: flight.setting(name) for name in _STICKS if name != one.name}
+    return one.name in _STICKS and one.value > len(_STICKS) and one.default not in others.values()
 
 
 def _is_without(flight: Flight) -> bool:
