@@ -77,6 +77,9 @@ class FixPage(FiguredPage, DiagnosisPage):
         super().__init__(workspace, id=id)
         self._is_turned = False
         """Whether the curve has the place of the prediction, where there is room for one of them."""
+        self._columns: Callable[[int], OptionColumns] | None = None
+        """The columns that the list's lines share, measured over all of them for the values that they were told with."""
+        self._columns_of: tuple[dict[str, float], set[str]] = {}, set()
         self._responses: dict[Key, list[Odds]] = {}
         self._has_model = True
         """Whether there are odds to ask for, as far as they were asked for."""
@@ -106,9 +109,13 @@ class FixPage(FiguredPage, DiagnosisPage):
             ticked = option.name in basket.ticked
             return option_change(option, current, session.is_assumed(option), value, ticked, glyphs)
 
-        longest = max((len(clean(option.name)) for option in options), default=0)
-        changes = (change(option).cell_length for option in options if option.name in basket.values)
-        columns = partial(OptionColumns.sharing, name=longest, change=max(changes, default=0))
+        values = dict(basket.values), set(basket.ticked)
+        if self._columns is None or self._columns_of != values:
+            longest = max((len(clean(option.name)) for option in options), default=0)
+            changes = (change(option).cell_length for option in options if option.name in basket.values)
+            self._columns = partial(OptionColumns.sharing, name=longest, change=max(changes, default=0))
+            self._columns_of = values
+        columns = self._columns
 
         def item(index: int, room: int) -> tuple[Content]:
             option = options[index]
