@@ -78,7 +78,7 @@ class FixPage(FiguredPage, DiagnosisPage):
         self._is_turned = False
         """Whether the curve has the place of the prediction, where there is room for one of them."""
         self._columns: Callable[[int], OptionColumns] | None = None
-        """The columns that the list's lines share, measured over all of them for the values that they were told with."""
+        """The columns that the lines of the list share, measured over all of them for the values below."""
         self._columns_of: tuple[dict[str, float], set[str]] = {}, set()
         self._responses: dict[Key, list[Odds]] = {}
         self._has_model = True
