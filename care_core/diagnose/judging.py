@@ -281,7 +281,7 @@ def meaningful(
     run: Run, schema: Schema, bounds: Mapping[str, Threshold], judged_anyway: Container[str] = ()
 ) -> dict[str, Value]:
     """The run's objectives, those withheld whose value means nothing for its mission."""
-    if not run.mission.ended:
+    if not run.mission.ended and not run.checks:
         last = [one for one in run.log.damage if one.time_s is None or one.time_s >= run.mission.end_s - _AT_END_S]
         longer = "the file breaks off: see whether the original is longer"
         cut = Unavailable(
