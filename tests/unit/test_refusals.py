@@ -364,6 +364,17 @@ def test_every_motor_that_no_output_drives_is_set_with_the_one_that_is_named() -
     assert elsewhere.wanted == (("SERVO2_FUNCTION", 34),), "what another output drives is not missing"
 
 
+@pytest.mark.parametrize(("source", "wanted"), [(3.0, (("GPS_TYPE", 1),)), (6.0, ())])
+def test_a_receiver_that_is_switched_off_is_put_back_on_where_it_is_to_tell_the_place(
+    source: float, wanted: tuple[tuple[str, float], ...]
+) -> None:
+    settings: dict[str, Off] = {"GPS_TYPE": (0, 1), "EK3_SRC1_POSXY": (source, source)}
+    finding = refused_at(12.6, ["AHRS: waiting for home"], settings, has_receiver=False)
+    assert (finding.parameters, finding.wanted) == (("GPS_TYPE",), wanted)
+    kind = refused_at(12.6, ["AHRS: waiting for home"], {"GPS_TYPE": (8, 1)}, has_receiver=False)
+    assert kind.wanted == (), "it, or its cable"
+
+
 def test_a_stick_behind_the_first_four_channels_is_put_back_where_its_own_is_free() -> None:
     text, others = "Yaw (RC11) is not neutral", {"RCMAP_ROLL": (1, 1), "RCMAP_PITCH": (2, 2), "RCMAP_THROTTLE": (3, 3)}
     assert refused(text, RCMAP_YAW=(11, 4), **others).wanted == (("RCMAP_YAW", 4),)

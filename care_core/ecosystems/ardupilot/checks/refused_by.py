@@ -51,8 +51,9 @@ _NONE_AT = LIMITS.add("cell that no pack has", HARMED_V, "V", "voltages of lithi
 _MOTOR = re.compile(r"no SERVOx_FUNCTION set to Motor(\d+)")
 _RECEIVER = re.compile(r"GPS\d?_TYPE\d?")
 _STICKS = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_THROTTLE", "RCMAP_YAW")
-_OFF, _ANSWERS = 0, 1
-"""GPS_TYPE of a receiver that is switched off; GPS.Status of one without a fix, below it none is there."""
+_OFF, _ANSWERS, _BY_GPS = 0, 1, 3
+"""GPS_TYPE of a receiver that is switched off; GPS.Status of one without a fix, below it none is there; and
+EK3_SRC1_POSXY of what knows its place by a receiver."""
 _SAME = 1e-6
 """Vehicles hold parameters in 32 bits."""
 
@@ -158,7 +159,8 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
     elif proven := _at_fault(named):
         yield from (_refusing(one, PROVEN, is_shown=True) for one in proven)
     elif (unanswered := [one for one in held if one.is_off and _RECEIVER.fullmatch(one.name)]) and _is_without(flight):
-        yield from (_unanswered(one) for one in unanswered)
+        is_by_gps = flight.setting("EK3_SRC1_POSXY") in (None, _BY_GPS)
+        yield from (_unanswered(one, is_wanted=is_by_gps) for one in unanswered)
     else:
         sure = OFF * OUTSIDE if is_outside else OFF
         yield from (_unproven(flight, _refusing(one, sure), one) for one in held if one.is_far_off)
@@ -184,10 +186,10 @@ def _is_without(flight: Flight) -> bool:
     return not any((table["Status"] >= _ANSWERS).any() for table in flight.all("GPS", "Status"))
 
 
-def _unanswered(one: _Held) -> Refusing:
+def _unanswered(one: _Held, *, is_wanted: bool) -> Refusing:
     """A kind of receiver that was set and that never answered: it, or the receiver; which its operator knows. One that
-    is switched off answers nobody."""
-    if one.value == _OFF and one.default:
+    is switched off answers nobody, and is put back on where the vehicle is to know its place by it."""
+    if one.value == _OFF and one.default and is_wanted:
         return _refusing(one, PLAUSIBLE, "which is none", is_shown=True)
     words = f"{one.name} is {one.value:g} (default {one.default:g}), and no receiver answers: check it and its cable"
     return Refusing(one.name, words, None, PLAUSIBLE, is_shown=True)
