@@ -32,7 +32,7 @@ STATUS_WORDS: dict[RunStatus, str] = {
 }
 UNKNOWN_PARAMETER = "a parameter that the profile does not know"
 GUESS = "\u00a0probability\u00a0(a\u00a0guess)"
-NO_LIMIT = "no limit of this mission is known"
+NO_GOALS = "no goals are recorded: what the robot was to do is not known"
 _MEASURED = re.compile(r"\s*\([^)]*\d[^)]*\)")
 """What a text has in parentheses, with a number."""
 _CLAUSE = re.compile(r"\s*[,;(]")
@@ -477,7 +477,7 @@ def why_unjudged(findings: Sequence[SeenFinding]) -> str:
     refused = next((one.title for one in findings if one.kind == "prearm"), "")
     if refused:
         return f"{refused} (it never armed)"
-    return next((one.title for one in findings if one.source == WHOLE_LOG), NO_LIMIT)
+    return next((one.title for one in findings if one.source == WHOLE_LOG), NO_GOALS)
 
 
 def fit_words(profile: str, verdict: FitVerdict) -> str:

@@ -181,7 +181,7 @@ NAMED = {
         (["ok", "fault"], {"findings": [NAMED]}, "FAULT: o1 not met"),
         (["ok", "not_evaluated"], {}, "NOT EVALUATED: o1 could not be evaluated; no fault was found"),
         ([], {}, "NOT EVALUATED: nothing could be judged"),
-        (["not_evaluated"], {"fit": {"verdict": "no", "reasons": []}}, "NOT EVALUATED: no limit of this mission"),
+        (["not_evaluated"], {"fit": {"verdict": "no", "reasons": []}}, "NOT EVALUATED: no goals are recorded"),
         (["ok"], {"findings": [{**NAMED, "severity": "info"}]}, "OK: all objectives are within their thresholds"),
     ],
 )
