@@ -55,10 +55,14 @@ class DiffPage(ProvenPage):
     side: DiffSide = "driven"
     _told: tuple[str, ...] = ()
     """What was written last, and where what it was before is."""
+    _told_of: object = None
+    """Files and changes that this was of."""
 
     def enter(self) -> None:
         self.forget(DIFF)
         case, fix, side = self.session.case, self.session.fix, self.side
+        if self._told_of != self._asked_for:
+            self._told = ()
         if case is None or fix is None or not (fix.changes or side == "changed") or not self.has_content:
             return
         engine, decided = self.workspace.engine, self.session.decided()
@@ -214,10 +218,17 @@ class DiffPage(ProvenPage):
             self.say(str(answer))
         elif isinstance(answer, list):
             self.workspace.written += [file for file, _ in answer]
+            self._told_of = self._asked_for
             self._told = tuple(f"wrote {file}, the old one is {backup.name}" for file, backup in answer)
             if not answer:
                 self.say(HELD)
             self._turn("file")
+
+    @property
+    def _asked_for(self) -> object:
+        """The files that would be written, and what would be put into them."""
+        case, fix = self.session.case, self.session.fix
+        return case and case.configs, fix and changes_of(fix)
 
     def _ask_to_apply(self, answer: object) -> None:
         """The difference to the file is known, and the doubts about it."""

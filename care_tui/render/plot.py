@@ -163,7 +163,7 @@ class Figure(Record):
     def rows(self, width: int, height: int, glyphs: Glyphs) -> list[Row]:
         """The figure in so many cells: what it is, the plot, what happened, and the axis of time."""
         trace, wide = self.trace, max(width - AXIS, 10)
-        legend = self._legend(width, glyphs) if self.has_legend and height >= LOWEST_WITH_LEGEND else []
+        legend = self._legend(width, wide, glyphs) if self.has_legend and height >= LOWEST_WITH_LEGEND else []
         high = max(height - 3 - len(legend), LOWEST)
         span = self._span(wide)
         cursor = None if self.cursor_s is None else self._place(self.cursor_s, wide)
@@ -186,15 +186,18 @@ class Figure(Record):
         sign, why = ". " if glyphs is ASCII else "", "beside" if self.signal.is_beside else "wanted"
         return head + Content.styled(f"  {sign}{clean(self.signal.wanted_name)} ({why})", WANTED)
 
-    @property
-    def _drawn(self) -> list[Mark]:
-        """The marks in the time that is drawn."""
-        return [mark for mark in self.marks if self.trace.start_s <= mark.time_s <= self.trace.end_s]
+    def _drawn(self, wide: int) -> dict[int, Mark]:
+        """The marks in the time that is drawn, by their cell: of those in one the first."""
+        drawn: dict[int, Mark] = {}
+        for mark in self.marks:
+            if self.trace.start_s <= mark.time_s <= self.trace.end_s:
+                drawn.setdefault(self._place(mark.time_s, wide), mark)
+        return drawn
 
-    def _legend(self, width: int, glyphs: Glyphs) -> list[Row]:
+    def _legend(self, width: int, wide: int, glyphs: Glyphs) -> list[Row]:
         """What each sign on the axis means, by the first of its kind; the gravest first, as far as they fit."""
         first: dict[str, Mark] = {}
-        for mark in sorted(self._drawn, key=lambda mark: mark.rank):
+        for mark in sorted(self._drawn(wide).values(), key=lambda mark: mark.rank):
             first.setdefault(sign_of(mark, glyphs), mark)
         line = f"{'':>{AXIS - 2}}"
         for sign, mark in first.items():
@@ -208,8 +211,8 @@ class Figure(Record):
         signs = [" "] * wide
         if span is not None:
             signs[span[0] : span[1] + 1] = glyphs.rule * (span[1] + 1 - span[0])
-        for mark in reversed(self._drawn):
-            signs[self._place(mark.time_s, wide)] = sign_of(mark, glyphs)
+        for place, mark in self._drawn(wide).items():
+            signs[place] = sign_of(mark, glyphs)
         return Content(f"{'':>{AXIS}}{''.join(signs)}")
 
     def _times(self, wide: int) -> Content:

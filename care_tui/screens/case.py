@@ -119,13 +119,18 @@ class CaseScreen(Screen[None]):
         return self.workspace.session
 
     def on_resize(self) -> None:
-        self.call_after_refresh(self._give_focus_back)
+        self.call_after_refresh(self._fit)
 
-    def _give_focus_back(self) -> None:
-        """What is hidden loses the focus, so a terminal that was too small for a moment has nothing that takes keys."""
+    def _fit(self) -> None:
+        """What is hidden loses the focus and is told of no size: a terminal that was too small for a moment has nothing
+        that takes keys, and an answer for another height."""
         is_hidden = self.has_class("-too-narrow") or self.has_class("-too-low")
-        if self.focused is None and not is_hidden and self.query_one(ContentSwitcher).current is not None:
+        if is_hidden or self.query_one(ContentSwitcher).current is None:
+            return
+        if self.focused is None:
             self.page.take_focus()
+        self._name_log()
+        self.query_one(AnswerBar).tell(self.session)
 
     # Turning to a page
 
@@ -189,14 +194,17 @@ class CaseScreen(Screen[None]):
         empty = session.empty_steps()
         self.query_one("#step-tabs", TabRow).mark(self.here, empty)
         self.query_one("#view-tabs", TabRow).mark(self.here, [page.name for page in VIEWS if self._lacks(page.name)])
-        room = self.app.size.width - STEPS_WIDTH
-        name = ""
+        self._name_log()
+        self.query_one(AnswerBar).tell(session)
+
+    def _name_log(self) -> None:
+        """The name of the log at the end of the first row, as far as there is room."""
+        session, name, room = self.session, "", self.app.size.width - STEPS_WIDTH
         if session.path is not None and room >= SHORTEST_NAME:
             name = without_middle(session.path.name, room, self.workspace.glyphs)
         shown = self.query_one("#log-name", Static)
         if shown.content != name:
             shown.update(name)
-        self.query_one(AnswerBar).tell(session)
 
     def _lacks(self, name: str) -> str:
         """What a page needs that is not there; empty where there is all."""

@@ -27,6 +27,7 @@ from care_tui.render.rows import ASCII
 from care_tui.screens.case import CaseScreen
 from care_tui.screens.confirm import Confirm
 from care_tui.settings import Settings
+from care_tui.widgets.answer_bar import AnswerBar
 from care_tui.widgets.tab_row import TabRow
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
@@ -215,7 +216,9 @@ async def test_the_change_is_put_into_the_file_that_is_asked_for_and_the_old_one
         assert file.read_text() == before, "nothing is written unasked"
         await settle(pilot, "A", "y")
         assert "the old one is robot.param.bak" in " ".join(text(app).split()), "where it is can still be read"
-        await settle(pilot, "A")
+        await settle(pilot, "4", "plus", "5")
+        assert "the old one is robot.param.bak" not in text(app), "this change was not written"
+        await settle(pilot, "4", "u", "5", "A")
         assert not isinstance(app.screen, Confirm), "there is nothing to ask"
         assert "holds these values already" in app.title
     assert file.read_text() == before.replace("16", "40")
@@ -440,3 +443,31 @@ def test_what_is_said_running_is_told_once_until_something_else_is_said() -> Non
         ("b", 3, 3.0),
         ("a", 1, 4.0),
     ]
+
+
+@needs_sample
+async def test_what_is_of_the_size_of_the_screen_follows_it() -> None:
+    app = real()
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "v", "2", "v")
+        assert len(text(app).splitlines()) > 20
+        assert not any(len(line.strip()) == 1 for line in text(app).splitlines()), (
+            "it was asked for while it was hidden"
+        )
+        pinned = shown_above(app)
+        assert "Next" in pinned
+        assert SAMPLE.name in pinned
+        await pilot.resize_terminal(59, 20)
+        await settle(pilot)
+        await pilot.resize_terminal(120, 40)
+        await settle(pilot)
+        assert shown_above(app) == pinned
+        await pilot.resize_terminal(60, 20)
+        await settle(pilot)
+        assert not str(app.screen.query_one("#log-name", Static).content), "there is no room for it"
+
+
+def shown_above(app: CareApp) -> str:
+    """The name of the log and the pinned answer."""
+    screen = app.screen
+    return f"{screen.query_one('#log-name', Static).content} {screen.query_one(AnswerBar).content}"
