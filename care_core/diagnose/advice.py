@@ -14,6 +14,7 @@ from care_core.diagnose.fixes import (
     GAIN_FOR_ONE_MORE,
     MAX_ALTERNATIVES,
     Assignment,
+    is_needed,
     needs_unsafe,
     search,
     settled,
@@ -130,9 +131,9 @@ def of_outside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothes
 def _with_one_more(
     lead: Advisable, failed: FailedRun, beside: Assignment, odds: float, promise: Promise
 ) -> Iterator[Fix]:
-    """The same for a vehicle that was refused, with the option put back without which the mission that is still before
-    it promises much less."""
-    free = _free(failed) if was_refused(failed.findings) else {}
+    """The same with the option put back that adds most to the odds: of a vehicle that was refused, whose mission is
+    still before it, and of an option that is likelier not needed."""
+    free = _free(failed)
     sets = [{**beside, name: free[name]} for name in sorted(free.keys() - beside)]
     reached = [_without(failed, promise, [lead.name], options) for options in sets]
     if reached and (most := max(reached)) >= odds + GAIN_FOR_ONE_MORE:
@@ -201,7 +202,7 @@ def _beside(lead: Advisable, failed: FailedRun, hypotheses: Sequence[Hypothesis]
             name: promise.without([lead.name], {**query.config, **chosen, name: free[name]}) for name in sorted(rest)
         }
         best = max(odds, key=lambda name: odds[name])
-        if odds[best] < now + GAIN_FOR_ONE_MORE:
+        if not is_needed(now, odds[best]):
             break
         chosen[best] = free[best]
     return chosen

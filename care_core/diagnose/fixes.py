@@ -21,6 +21,9 @@ BEAM = 8
 GAIN_FOR_ONE_MORE = 0.1
 """Probability that one more change, the first included, must add: each is something an operator has to do and to
 believe."""
+NEEDED = 0.5
+"""Share of its odds that a set keeps without one of its changes, up to which that is among them: the run is likelier to
+be lost without it than not."""
 DISTANCE_COST = 0.02
 """Probability given up for leaving a value where it is rather than moving it across its whole range."""
 NEARLY = 0.02
@@ -191,12 +194,17 @@ def _ranked(query: CounterfactualQuery, sets: Sequence[Assignment]) -> list[tupl
 
 
 def smallest_good(found: list[tuple[Assignment, float]]) -> int:
-    """Index of the set to suggest: one more change only where it adds enough probability."""
+    """Index of the set to suggest: one more change only where it is likelier needed than not."""
     chosen = 0
     for i in range(1, len(found)):
-        if found[i][1] >= found[chosen][1] + GAIN_FOR_ONE_MORE * (i - chosen):
+        if is_needed(found[chosen][1], found[i][1], more=i - chosen):
             chosen = i
     return chosen
+
+
+def is_needed(without: float, together: float, more: int = 1) -> bool:
+    """Whether so many more changes are, by the odds that all limits are met with the others alone and with all."""
+    return together >= without + GAIN_FOR_ONE_MORE * more and without <= together * NEEDED
 
 
 def to_fix(query: CounterfactualQuery, assignment: Assignment, probability: float) -> Fix:

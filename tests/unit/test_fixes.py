@@ -167,13 +167,15 @@ def test_the_best_value_alone(planted: Profile) -> None:
     [
         ([0.8], 0),
         ([0.8, 0.85], 0),
-        ([0.5, 0.65], 1),
-        ([0.5, 0.55, 0.75], 2),
-        ([0.5, 0.65, 0.7], 1),
+        ([0.5, 0.65], 0),
+        ([0.3, 0.65], 1),
+        ([0.3, 0.35, 0.75], 2),
+        ([0.3, 0.65, 0.7], 1),
+        ([0.02, 0.08], 0),
         ([0.4, 0.3, 0.2], 0),
     ],
 )
-def test_one_more_change_must_be_worth_it(probability: list[float], chosen: int) -> None:
+def test_one_more_change_is_likelier_needed_than_not(probability: list[float], chosen: int) -> None:
     assert smallest_good([({str(j): 0.0 for j in range(i + 1)}, p) for i, p in enumerate(probability)]) == chosen
 
 
