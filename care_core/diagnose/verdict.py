@@ -397,7 +397,10 @@ def _unjudged_for(alike: Sequence[JudgedObjective], *, is_one_of_many: bool = Fa
         told = f"whether it {listed([_ASKED_OF_RUN[name] for name in names])}"
     if not reason:
         return f"{told} could not be evaluated"
-    return reason if is_one_of_many or len(alike) > FEW else f"{told}: {_HINT.sub('', reason)}"
+    if is_one_of_many or len(alike) > FEW:
+        return reason
+    answers = told.startswith("whether") and reason.startswith("it ")  # what it did says what is not known
+    return _HINT.sub("", reason if answers else f"{told}: {reason}")
 
 
 _HINT = re.compile(r" \((?:record|the file) .*\)$")

@@ -84,6 +84,18 @@ def test_a_blow_out_of_the_blue_that_a_sensor_clips_at_is_what_it_hit(shakes_s: 
     assert (STRUCK in {one.title for one in every_finding(made.find())}) == is_told
 
 
+@pytest.mark.parametrize(("blow", "is_told"), [(90.0, True), (45.0, False)])
+def test_a_blow_in_the_air_that_it_survives_is_what_it_hit(blow: float, is_told: bool) -> None:
+    made = Made()
+    made.table["ATT"]["Roll"][made.after(FAILS_S, FAILS_S + 0.6)] = 50.0
+    made.table["IMU"]["AccX"][made.after(FAILS_S - 0.2, FAILS_S - 0.1)] = blow
+    for name in ("VIBE", "VIBE#2"):
+        made.table[name]["Clip"] = np.where(made.t > FAILS_S - 0.2, 1.0, 0.0)
+    assert made.flight().lost_control_s is None
+    told = [one for one in every_finding(made.find()) if one.title == STRUCK]
+    assert [(one.suspect, "flew on" in one.evidence) for one in told] == [("world", True)] * is_told
+
+
 @pytest.mark.parametrize(("speed_ms", "held"), [(0.05, True), (1.0, False)])
 def test_what_leans_far_beyond_its_demand_and_rests_is_held(speed_ms: float, held: bool) -> None:
     made = Made()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from care_core.ecosystems.ardupilot.examining import find
@@ -93,6 +94,30 @@ def test_a_failsafe_whose_text_comes_after_its_disarming_was_a_lost_radio() -> N
     made = Made()
     made.rows["MSG"].append((DOWN_S + 5.1, {"Message": "Radio Failsafe - Disarming"}))
     assert "the radio link was lost" in [one.title for one in every_finding(made.find())]
+
+
+@pytest.mark.parametrize(
+    ("said", "pulse_us", "is_told"),
+    [("PreArm: Radio failsafe on", 1500.0, True), ("", 874.0, True), ("", 1500.0, False), ("", 0.0, False)],
+)
+def test_a_failsafe_of_the_heartbeat_is_the_radios_by_its_text_or_its_pulse(
+    said: str, pulse_us: float, is_told: bool
+) -> None:
+    made = Made()
+    made.rows["MSG"].append((48.0, {"Message": said}))
+    made.table["RCIN"] = {"C3": np.full(len(made.t), pulse_us)}
+    made.table["STAT"] = {"Armed": np.ones(len(made.t)), "State": np.where(made.after(50.0, 59.0), 5.0, 4.0)}
+    assert ("the radio link was lost" in [one.title for one in every_finding(made.find())]) is is_told
+
+
+@pytest.mark.parametrize(
+    ("source", "word"), [(1.0, "magnetic field"), (6.0, "heading from external navigation"), (None, "magnetic field")]
+)
+def test_the_test_of_the_heading_is_named_by_what_it_is_taken_from(source: float | None, word: str) -> None:
+    made = Made()
+    made.settings |= {} if source is None else {"EK3_SRC1_YAW": source}
+    made.table["XKF4"]["SM"][made.after(50.0, 60.0)] = 2.3
+    assert f"{word} 2.3" in next(one for one in every_finding(made.find()) if one.kind == "estimator").evidence
 
 
 def test_telemetry_tells_in_words_what_a_log_records_of_the_estimator(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,10 +49,14 @@ def fails_at(made: Made, text: str) -> None:
 # --- the battery
 
 
+@pytest.mark.parametrize("full", [None, 28.05])
 @pytest.mark.parametrize("scale", [8.2, 9.0, 13.0])
-def test_a_voltage_that_only_the_default_scale_makes_full(scale: float) -> None:
+def test_a_voltage_that_only_the_default_scale_makes_full(scale: float, full: float | None) -> None:
+    """Whatever a full pack that was changed as well says of its cells."""
     made = MadeWithDefaults()
     made.drive("BATT_VOLT_MULT", scale, 10.1)
+    if full is not None:
+        made.drive("MOT_BAT_VOLT_MAX", full, 12.8)
     made.table["BAT"]["Volt"] *= scale / 10.1
     finding = made.find()[0]
     assert finding.parameters == ("BATT_VOLT_MULT",)

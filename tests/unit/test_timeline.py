@@ -275,6 +275,14 @@ def test_the_highest_point_of_an_estimate_that_runs_away_is_the_barometers() -> 
     assert texts(told({"ARM": ARMED, "CTUN": controls}), "flight") == ["highest point, 3.0 m"]
 
 
+def test_the_highest_point_is_found_in_records_that_come_in_bursts() -> None:
+    t = np.sort(np.concatenate([np.arange(0.0, 100.0, 1.2) + step * 0.007 for step in range(5)]))
+    height = np.interp(t, [12, 20, 50, 52, 56, 70], [0.0, 36.0, 36.0, 56.0, 36.0, 0.0])
+    throttle = np.where((t > 12) & (t < 70), 0.4, 0.0)
+    events = texts(told({"ARM": ARMED, "CTUN": Table(t, {"ThO": throttle, "Alt": height})}), "flight")
+    assert float(events[0].split()[2]) > 50.0
+
+
 def test_texts_of_numbers_alone_are_left_out() -> None:
     events = told({"MSG": said((1.0, " 0.35 -0.42 -29.93"), (2.0, "GPS Attack Started"), (3.0, "  "))})
     assert texts(events, "message") == ["GPS Attack Started"]

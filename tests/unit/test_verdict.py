@@ -225,7 +225,7 @@ def test_whose_a_reason_is_is_told_where_it_is_not_that_of_many() -> None:
 
     none = [unknown(name, "no mission was flown") for name in ("mission_success", "mission_time", "energy")]
     grounded = unknown("took_off", "it never left the ground")
-    told = "NOT EVALUATED: no mission was flown; whether it took off: it never left the ground; no fault was found"
+    told = "NOT EVALUATED: no mission was flown; it never left the ground; no fault was found"
     assert verdict_on([*none, grounded, MET]).headline == told
     assert verdict_on([unknown("energy", ""), MET]).headline == (
         "NOT EVALUATED: energy could not be evaluated; no fault was found"

@@ -410,8 +410,25 @@ class Airborne(Armed):
                 lean = float(median(lies))
                 yield Hit(at, fell, f"it came down at {fell:.1f} m/s, and lay at {lean:.0f} degrees from then on")
 
+    @property
+    def survived(self) -> Hit | None:
+        """The first hit from which it flew on; None where there was none."""
+        return self._bumped if self.is_copter else self._grazed
+
     @cached_property
-    def grazed(self) -> Hit | None:
+    def _bumped(self) -> Hit | None:
+        """A blow out of the blue, in the air, that threw a copter off its attitude demand, which it had followed."""
+        hard = [(t, felt) for t, felt in self._blows() if not felt or felt > 2 * _SHOCK]
+        for at in _out_of_the_blue([one for one in hard if within(self.airborne, one[0])]):
+            thrown = any(at - _FLICK_S < t < at + _FLICK_S for t in self.left_demand)
+            if thrown and not self._was_going(at - _SAME_BLOW_S):
+                blow = max(felt for t, felt in hard if at <= t < at + _STRUCK_S)
+                said = f"a blow of {blow:.0f} m/s^2 threw it off its attitude; it came back, and flew on"
+                return Hit(at, self._flew_ms(at), said, "something")
+        return None
+
+    @cached_property
+    def _grazed(self) -> Hit | None:
         """A blow at the ground that took much of a plane's speed, though it came from above and flew on; None where
         there was none."""
         table, height, moved = self.one("IMU", "AccX", "AccY", "AccZ"), self.height, self.one("GPS", "Spd")

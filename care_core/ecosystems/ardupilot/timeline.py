@@ -19,7 +19,6 @@ from care_core.ecosystems.ardupilot.checks.log import ends_aloft
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.heartbeat import shown_failsafes
 from care_core.ecosystems.ardupilot.recorded import Mode
-from care_core.ecosystems.ardupilot.statistics import records
 from care_core.ecosystems.ardupilot.supply_events import supply_events
 from care_core.ecosystems.ardupilot.texts import (
     RECORDED,
@@ -310,7 +309,8 @@ def _highest_of(flight: Flight, known: tuple[Floats, Floats], start: float, end:
     if len(inside) < 3:
         return None
     t, height = t[inside], height[inside]
-    n = min(records(t, _STAYS_S), len(t))
+    mean_step = max(float(t[-1] - t[0]) / len(t), 1e-6)  # a radio link brings records in bursts
+    n = min(max(round(_STAYS_S / mean_step), 3), len(t))
     stayed = sliding_window_view(height, n).min(axis=1)
     top, lasting = int(np.argmax(height)), int(np.argmax(stayed)) + n // 2
     if float(height[top] - stayed.max()) > _SPIKE_M:

@@ -49,7 +49,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     begin = min((t for t in (told, said, lost, impact) if t is not None), default=None)
     if begin is None:
         yield from _stranded(flight)
-        yield from _grazed(flight)
+        yield from _survived(flight)
     elif _tipped(flight, lost if lost is not None else begin):
         if wrong_layout(flight) is not None:
             return  # that says why
@@ -172,17 +172,19 @@ def _stranded(flight: Flight) -> Iterator[Finding]:
         )
 
 
-def _grazed(flight: Flight) -> Iterator[Finding]:
-    if (hit := flight.grazed) is not None:
+def _survived(flight: Flight) -> Iterator[Finding]:
+    if (hit := flight.survived) is not None:
+        is_world = flight.is_copter
         yield Finding(
             kind="crash",
-            title=f"it hit the ground at {hit.speed_ms:.0f} m/s and flew on",
+            title=STRUCK if is_world else f"it hit {hit.what} at {hit.speed_ms:.0f} m/s and flew on",
             onset_s=hit.time_s,
             end_s=hit.time_s,
             severity="critical",
             evidence=hit.said,
-            source="IMU, GPS.Spd, height",
-            probability=_CRASHED_P,
+            source="IMU, VIBE.Clip, ATT, GPS.Spd, height",
+            suspect="world" if is_world else "hardware",
+            probability=_STRUCK_P if is_world else _CRASHED_P,
         )
 
 

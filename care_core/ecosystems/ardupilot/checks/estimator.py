@@ -32,6 +32,8 @@ _BOOTED_P = LIMITS.add("probability of ARMING_REQUIRE", 0.9, "", "it is all over
 _STANDS_S = LIMITS.add("shortest check that is not cleared", 5.0, "s", "a choice: disarming ends it as well")
 _TITLE = "the estimator rejects its measurements"
 _WORDS = {"SV": "velocity", "SP": "position", "SH": "height", "SM": "magnetic field"}
+_HEADINGS = {2.0: "heading of the GPS antennas", 6.0: "heading from external navigation"}
+"""By EK3_SRC1_YAW; others are the compass's, or none is tested."""
 _NEEDS_NO_ARMING = "ARMING_REQUIRE"
 _LANE = re.compile(r"(lane switch|EKF primary changed|switching to (compass|IMU|GPS)|EKF Failsafe|EKF variance)", re.I)
 _HAS_POSITION = re.compile(r"EKF\d IMU\d is using GPS|AHRS: EKF\d active")
@@ -56,7 +58,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     elif not worst and (position_s := _armed_before_position(flight, failed)) is not None:
         yield _armed_too_early(failed[0], position_s)
     else:
-        yield _rejects(worst, failed)
+        yield _rejects(flight, worst, failed)
 
 
 def _rejections(flight: Flight) -> dict[str, _Rejection]:
@@ -121,8 +123,14 @@ def _armed_too_early(failed_s: float, position_s: float) -> Finding:
     )
 
 
-def _rejects(worst: Mapping[str, _Rejection], failed: list[float]) -> Finding:
-    said = [f"{_WORDS[field]} {one.peak:.1f}" for field, one in sorted(worst.items(), key=lambda pair: pair[1].start_s)]
+def _word(flight: Flight, field: str) -> str:
+    """What a test ratio is of: of the heading it is what the estimator takes it from."""
+    return _HEADINGS.get(flight.setting("EK3_SRC1_YAW") or 0.0, _WORDS[field]) if field == "SM" else _WORDS[field]
+
+
+def _rejects(flight: Flight, worst: Mapping[str, _Rejection], failed: list[float]) -> Finding:
+    by_time = sorted(worst.items(), key=lambda pair: pair[1].start_s)
+    said = [f"{_word(flight, field)} {one.peak:.1f}" for field, one in by_time]
     evidence = f"test ratios above {RATIO:g}: {', '.join(said)}" if said else "the firmware's EKF check failed"
     if failed:
         evidence += f"; EKF check or failsafe at {log_time(min(failed))}"

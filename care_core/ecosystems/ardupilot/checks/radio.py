@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.heartbeat import shown_failsafes
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.spans import within
@@ -12,10 +15,12 @@ from care_core.ecosystems.vehicles.errors import GCS_FAILSAFE, RADIO_FAILSAFE
 from care_core.logs.base import Wanted
 from care_core.text import log_time
 
-READS: Wanted = {}
+READS: Wanted = {"RCIN": ("C3",)}
 
 _LINKS = {RADIO_FAILSAFE: "the radio link was lost", GCS_FAILSAFE: "the ground station link was lost"}
 _WORDS = {RADIO_FAILSAFE: ("radio failsafe", "throttle failsafe"), GCS_FAILSAFE: ("gcs failsafe",)}
+_BEFORE_ARMING = ("radio failsafe", "throttle below failsafe", "rc not", "manual control", "pilot input")
+"""What a vehicle says of its radio before it is armed, and as it loses it."""
 _REASONS = {RADIO_FAILSAFE: 3, GCS_FAILSAFE: 5}
 """Why a mode was entered (ModeReason.h)."""
 LIMITS = Limits()
@@ -26,6 +31,8 @@ _LOST_P = LIMITS.add("probability of a lost link", 0.8, "", "the firmware's own 
 _TOLD_S = LIMITS.add(
     "text of a failsafe behind the disarming by it", 0.5, "s", "a choice: texts wait for a link, heartbeats do not"
 )
+_NO_PULSE = LIMITS.add("pulse of a throttle without a transmitter", 975.0, "us", "FS_THR_VALUE as shipped")
+_NO_SIGNAL = LIMITS.add("pulse that is none", 500.0, "us", "receivers send 800 to 2200; 0 is no receiver")
 _BRIEF_P = LIMITS.add("probability of a brief loss", 0.3, "", "a choice: links drop frames now and then")
 
 
@@ -40,6 +47,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         watched = [(start, stop + _TOLD_S) for start, stop in flight.watched]
         gone = sorted(t for t in gone if within(watched, t))
         if not gone:
+            yield from _by_heartbeat(flight) if subsystem == RADIO_FAILSAFE else ()
             continue
         back = [t for t, code in told if code == 0 and t > gone[0]]
         end = back[0] if back else max(flight.watched[-1][1], gone[0])
@@ -59,6 +67,32 @@ def find(flight: Flight) -> Iterator[Finding]:
             suspect="world",
             probability=_BRIEF_P if is_brief else _LOST_P,
         )
+
+
+def _by_heartbeat(flight: Flight) -> Iterator[Finding]:
+    """A radio failsafe that the heartbeat alone tells of: by what kept it from arming before, or its throttle's pulse
+    below what a transmitter sends."""
+    least = flight.setting("FS_THR_VALUE", "THR_FS_VALUE") or _NO_PULSE
+    for (start, end), words in shown_failsafes(flight):
+        pulses = flight.one("RCIN", "C3")
+        sent = np.empty(0) if pulses is None else pulses["C3"][(pulses.t >= start) & (pulses.t <= end)]
+        pulse = float(np.median(sent)) if len(sent) else np.nan
+        is_low = _NO_SIGNAL < pulse < least
+        if not is_low and not any(word in words.casefold() for word in _BEFORE_ARMING):
+            continue
+        low = f"; the throttle's pulse is {pulse:.0f} us, below the {least:g} of FS_THR_VALUE" if is_low else ""
+        yield Finding(
+            kind="radio",
+            title=_LINKS[RADIO_FAILSAFE],
+            onset_s=start,
+            end_s=end,
+            severity="critical",
+            evidence=f"{words} for {end - start:.0f} s{low}",
+            source="HEARTBEAT, RC_CHANNELS",
+            suspect="world",
+            probability=_LOST_P,
+        )
+        return
 
 
 def _acted(flight: Flight, subsystem: int, since_s: float) -> bool:

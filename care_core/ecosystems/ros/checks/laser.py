@@ -63,8 +63,12 @@ def find(drive: Drive) -> Iterator[Finding]:
                 yield _dead(drive, channel.name, *silent)
             else:
                 yield from _dropping(drive, channel.name)
+    noted: set[str] = set()
     for scans in drive.scans:
-        yield from faults(drive, scans)
+        for one in faults(drive, scans):
+            if one.severity != "info" or one.title not in noted:  # of several lasers a note is told once
+                yield one
+            noted.add(one.title)
 
 
 def faults(drive: Drive, scans: Scans) -> Iterator[Finding]:

@@ -274,11 +274,13 @@ def _at_rest(flight: Flight, table: Table, field: str) -> float | None:
 
 
 def _cells(flight: Flight) -> int | None:
-    """How many cells the parameters say that the pack has; None where they say nothing, or two things."""
-    full = flight.setting("MOT_BAT_VOLT_MAX", "Q_M_BAT_VOLT_MAX")
-    low = flight.setting(*LOW_VOLT)
-    said = {round(volts / cell) for volts, cell in ((full, FULL_V), (low, LOW_V)) if volts}
-    return said.pop() if len(said) == 1 else None
+    """How many cells the parameters say that the pack has; of two that say two things the one that nobody changed. None
+    where they say nothing, or as much."""
+    asked = ((("MOT_BAT_VOLT_MAX", "Q_M_BAT_VOLT_MAX"), FULL_V), (LOW_VOLT, LOW_V))
+    said = {names: round(volts / cell) for names, cell in asked if (volts := flight.setting(*names))}
+    if len(set(said.values())) > 1:
+        said = {names: cells for names, cells in said.items() if not any(map(flight.default_left, names))}
+    return next(iter(said.values())) if len(set(said.values())) == 1 else None
 
 
 CHECK = Check(
