@@ -63,9 +63,9 @@ SOURCES = {
     "arduplane": Source(
         ("data/plane/table.tar.xz",),
         "Missions of the ArduPlane V4.5.4 firmware in its software-in-the-loop simulator, recorded by this project "
-        "under random configurations and winds: those of 553 flights of 47 settings (mission, plane, site) in which no "
-        "hardware failed; DataFlash logs, read by `care ingest`.",
-        hardware="data/plane/table.csv",
+        "under random configurations and winds: 442 flights of 57 settings (mission with waits, turns of own radii, "
+        "commanded airspeeds and climbs, plane, site), of each mission the reference twice, and of the rest two thirds "
+        "with one to three options off; DataFlash logs, read by `care ingest`.",
     ),
     "quadplane": Source(
         ("data/quadplane/table.tar.xz",),

@@ -210,3 +210,43 @@ def test_px4_comes_down_later_from_higher_up_and_more_slowly(descent: float, hei
     usual = px4("px4_descent_time", descent_speed=descent, return_height=height)
     assert px4("px4_descent_time", descent_speed=descent, return_height=height + 5) >= usual
     assert px4("px4_descent_time", descent_speed=descent / 2, return_height=height) > usual
+
+
+PLANE = {
+    "speed": 20.0, "least_speed": 12.0, "most_speed": 30.0, "commanded_speed": 0.0, "path_length": 2000.0,
+    "loiter_turns": 0.0, "loiters": 0.0, "loiter_radius": 80.0, "hold_time": 0.0, "returns": 0.0,
+    "return_distance": 500.0, "period": 15.0, "leg_after_loiter": 0.0, "rises": 0.0, "first_rise": 0.0,
+    "first_length": 200.0, "legs_length": 1000.0, "climb_rate": 5.0,
+}  # fmt: skip
+
+
+def plane(kind: str, **changed: float) -> float:
+    given = {**PLANE, **changed}
+    columns = np.array([[given[name] for name in FORMULAS[kind].arguments]])
+    return float(nominal(kind, {}, dict.fromkeys(given, "")).of(columns)[0])
+
+
+def test_a_planes_mission_is_its_legs_and_its_circles() -> None:
+    straight = plane("plane_mission_time")
+    assert plane("plane_mission_time", path_length=2200.0) - straight == pytest.approx(10.0)
+    assert plane("plane_mission_time", returns=1.0) - straight == pytest.approx(25.0)
+    circle_s = 2 * np.pi * 80.0 / 20.0
+    waits, turns = plane("plane_mission_time", hold_time=15.0, loiters=1.0), plane("plane_mission_time", loiter_turns=1)
+    assert 15.0 < waits - straight < 15.0 + circle_s, "it has to find the circle, and its course out of it"
+    assert circle_s < turns - straight < 2 * circle_s
+
+
+def test_a_quadplane_has_constants_of_its_own() -> None:
+    straight = plane("quadplane_mission_time")
+    assert plane("quadplane_mission_time", returns=1.0) - straight == pytest.approx(25.0)
+    assert plane("quadplane_mission_time", loiter_turns=1.0) - straight == pytest.approx(2 * np.pi * 80.0 / 20.0)
+    assert plane("quadplane_path_error", leg_after_loiter=1.0) == pytest.approx(100.0)
+    assert plane("plane_path_error", leg_after_loiter=1.0) == pytest.approx(96.0)
+    assert plane("quadplane_height_error", rises=200.0) - plane("quadplane_height_error") == pytest.approx(0.2)
+
+
+def test_a_plane_is_below_its_leg_while_the_way_to_it_left_no_time_to_climb() -> None:
+    level, steep = plane("plane_height_error"), plane("plane_height_error", first_rise=60.0)
+    assert plane("plane_height_error", first_rise=60.0, first_length=600.0) == pytest.approx(level)
+    assert steep > plane("plane_height_error", first_rise=40.0) > level
+    assert level < plane("plane_height_error", rises=625.0) < plane("plane_height_error", rises=625.0, climb_rate=2.0)

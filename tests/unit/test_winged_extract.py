@@ -108,6 +108,8 @@ def test_a_leg_begins_where_the_circle_before_it_is() -> None:
     assert leg.start.circle == 1.0
     assert leg.length == pytest.approx(math.hypot(500.0, 300.0), abs=0.1)
     assert value("sharpest_corner", flight) == pytest.approx(0.0, abs=0.1), "a plane leaves a circle in any direction"
+    assert value("legs_asked", flight, what="loiters") == 1.0
+    assert value("legs_asked", flight, what="first_rise") == 0.0, "in the circle it has the time to climb"
 
 
 def test_a_waypoint_that_was_passed_counts() -> None:
@@ -206,6 +208,8 @@ def test_a_circle_of_its_own_radius_is_no_circle_of_the_parameter() -> None:
     flight = mission(CMD=Table(items.t, {**items.columns, "Prm3": own}))
     assert value("loiter_turns", flight) == 0.0
     assert value("legs_asked", flight, what="after_loiter") == 0.0, "the leg from it is on the final"
+    assert value("legs_asked", flight, what="loiters") == pytest.approx(0.85 * 2 * 120.0 / 60.0)
+    assert value("legs_asked", what="loiters") == 0.0, "the parameter's circles are counted as turns"
     assert value("mission_asked", flight, what="hold_time") == pytest.approx(2 * math.tau * 120.0 / 12.0)
 
 

@@ -21,6 +21,7 @@ from care_core.ecosystems.ardupilot.held_missions import (
     PLACES,
     RETURN,
     HeldMission,
+    Item,
 )
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures import rests
@@ -61,6 +62,8 @@ _SAME_PLACE_M = 1.0
 _LOITER_RADIUS_M = 60.0
 """As shipped (ArduPlane/config.h)."""
 _MIN_AIRSPEED = 5.0
+_MORE_TURNS = 0.85
+"""What a turn takes longer than its circle, in what joining a wait takes; training flights of the reference."""
 
 _AIRSPEED: Wanted = {"CTUN": ("As",), "NTUN": ("TAsp",)}
 _HEIGHT: Wanted = {"NTUN": ("AltE",)}
@@ -106,11 +109,20 @@ class Legs(Record, eq=False):
     """By the number of the waypoint among the waypoints, from 2."""
     spans: Mapping[int, Span]
     """When each that was flown whole was flown."""
+    loiters: float
+    """Circles of WP_LOITER_RAD that joining and leaving those of the whole mission takes."""
 
     @property
     def after_loiter(self) -> float:
         """The widest circle that one of the legs begins on, and so off its line; 0 where none does."""
         return max((leg.start.circle or 0.0 for leg in self.legs.values()), default=0.0)
+
+    def first_rise(self, start_m: float) -> float:
+        """How much the way to the first of them leads up, from a height on; 0 where a circle before them gives the time
+        for it."""
+        if not self.legs or self.legs[min(self.legs)].start.circle is not None:
+            return 0.0
+        return max(self.corners[0].height - start_m, 0.0)
 
     @property
     def way(self) -> Floats:
@@ -126,7 +138,8 @@ def legs_of(mission: Mission) -> Legs | Unavailable:
     numbers = held.waypoints[: _before_landing(held, flown.route, flown.end)]
     corners: list[Corner] = []
     legs: dict[int, Leg] = {}
-    for number, corner in _corners(held, home, number_set(mission, "WP_LOITER_RAD", _LOITER_RADIUS_M)):
+    radius_m = number_set(mission, "WP_LOITER_RAD", _LOITER_RADIUS_M)
+    for number, corner in _corners(held, home, radius_m):
         if numbers and number <= numbers[-1]:
             if number in numbers[1:]:
                 legs[numbers.index(number) + 1] = Leg(corners[-1], corner)
@@ -136,7 +149,16 @@ def legs_of(mission: Mission) -> Legs | Unavailable:
         for (name, index), phase in flown.phases.items()
         if name == "leg" and index in legs
     }
-    return Legs(tuple(corners), legs, spans)
+    loiters = sum(_joined(item, radius_m) for item in held.items.values() if item.command in CIRCLES)
+    return Legs(tuple(corners), legs, spans, loiters)
+
+
+def _joined(item: Item, radius_m: float) -> float:
+    """Circles that joining and leaving a loiter takes: one of a wait. Turns take half as long again as their circles,
+    and where they have a radius of their own these are told as a wait."""
+    if item.command != LOITER_TURNS:
+        return 1.0
+    return _MORE_TURNS * item.first * item.radius_m / max(abs(radius_m), 1.0)
 
 
 def _before_landing(held: HeldMission, route: Floats, end: tuple[float, float] | None) -> int:
@@ -433,19 +455,27 @@ def _apart(corners: Sequence[Corner]) -> list[Corner]:
 _LEGS: Mapping[str, Callable[[Legs, float], float]] = {
     "length": lambda legs, _start_m: sum(leg.length for leg in legs.legs.values()),
     "after_loiter": lambda legs, _start_m: legs.after_loiter,
-    "rises": lambda legs, start_m: (
+    "loiters": lambda legs, _start_m: legs.loiters,
+    "rises": lambda legs, _start_m: sum(max(leg.rise, 0.0) ** 2 for leg in legs.legs.values()),
+    "climbs": lambda legs, start_m: (
         sum(max(leg.rise, 0.0) ** 2 for leg in legs.legs.values())
         + (_FIRST_CLIMB * max(legs.corners[0].height - start_m, 0.0) ** 2 if legs.corners else 0.0)
     ),
+    "first_length": lambda legs, _start_m: math.hypot(*legs.way[1]) if legs.corners else 0.0,
+    "first_rise": lambda legs, start_m: legs.first_rise(start_m),
 }
+
 _FIRST_CLIMB = 0.5
-"""The part of the climb to the first waypoint that is left when its leg is over."""
+"""The part of the climb to the first waypoint that is left when its leg is over, where nothing tells it."""
 
 
 @extractor("legs_asked", needs=NEEDS, unit="", args={"what": one_of(", ".join(_LEGS), *_LEGS)})
 def legs_asked(mission: Mission, args: Args) -> Value:
     """One number of the legs of a plane's mission that are judged: their `length` in m, the widest circle that one
-    begins on as a share of WP_LOITER_RAD (`after_loiter`), the squares of what they lead up, `rises` in m^2."""
+    begins on as a share of WP_LOITER_RAD (`after_loiter`), the squares of what they lead up, `rises` in m^2, and these
+    with a part of the climb to the first, `climbs`; of the way to the first of them its length and what it leads up,
+    `first_length` and `first_rise` in m; of the whole mission the circles that joining and leaving its loiters takes,
+    `loiters`, of WP_LOITER_RAD."""
     legs, asked = mission.shared(legs_of), mission.shared(requested_mission)
     if isinstance(legs, Unavailable):
         return legs
