@@ -15,7 +15,7 @@ import numpy as np
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.configs.driven import same_value
-from care_core.diagnose.estimates import BY_CAUSES
+from care_core.diagnose.estimates import BY_CAUSES, PROMISED_MORE
 from care_core.diagnose.noisy_or import CHANCE, Key, NoisyOr
 from care_core.numbers import Floats, logistic, logit
 from care_core.records import Record
@@ -37,8 +37,9 @@ class Promise(Record, eq=False):
         this run's failure once what a change does not touch is counted, and than what the changed causes explain."""
         gone = [self._changed(config) for config in configs]
         driven = self._pooled([self.query.config], [frozenset()])[0]
-        at_most = [driven + self.failure.acts_among(keys) for keys in gone]
-        return np.minimum(self._pooled(configs, gone), at_most)
+        explained = [driven + self.failure.acts_among(keys) for keys in gone]
+        promised = logistic(logit(self._pooled(configs, gone), SURE) + PROMISED_MORE.value)
+        return np.minimum(np.minimum(promised, explained), max(self._left(), SURE))
 
     def as_driven(self) -> float:
         """Probability that the next run meets every limit without a change."""
@@ -82,11 +83,15 @@ class Promise(Record, eq=False):
         return is_past or option.distance(value, reference) < option.distance(driven, reference)
 
     def _pooled(self, configs: Sequence[Config], gone: Sequence[frozenset[Key]]) -> Floats:
-        options = {("parameter", name) for name in self.query.config}
-        untouched = [key for key in self.failure.loses if key not in options and key != CHANCE]
-        mechanisms = self.query.probability(configs) * (1.0 - self.failure.acts_among(untouched))
+        mechanisms = self.query.probability(configs) * self._left()
         causes = np.array([self.failure.repaired(keys) for keys in gone]) * self._others_kept(configs)
         return logistic((1.0 - BY_CAUSES.value) * logit(mechanisms, SURE) + BY_CAUSES.value * logit(causes, SURE))
+
+    def _left(self) -> float:
+        """Probability that nothing of what no option touches, parts and what was met, lost the run."""
+        options = {("parameter", name) for name in self.query.config}
+        untouched = {key for key in self.failure.loses if key not in options and key != CHANCE}
+        return 1.0 - self.failure.acts_among(untouched)
 
     def _others_kept(self, configs: Sequence[Config]) -> Floats:
         """Probability that the objectives which this run did not miss are met."""

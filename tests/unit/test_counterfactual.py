@@ -11,7 +11,7 @@ from care_core.causal.all_objectives import AllObjectives
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import TAIL
 from care_core.causal.model import NoiseCarryOver
-from care_core.profile.store import Profile
+from care_core.profile.store import Profile, load_profile
 from care_core.records import replace
 from care_core.run import Unavailable
 from care_core.variables import Threshold
@@ -188,6 +188,19 @@ def test_a_run_that_failed_a_stage_keeps_failing_until_an_option_changes(planted
     same, reset = refused.config, {**refused.config, "min_sats": 6.0}
     assert refused.predict("success", [same]).p_ok[0] <= blind.predict("success", [same]).p_ok[0] + 1e-9
     assert refused.predict("success", [reset]).p_ok[0] > 0.7
+
+
+def test_what_a_failed_stage_leads_to_says_no_more_of_the_next_run() -> None:
+    """A plane that never climbed is disarmed by force: that says nothing of one that climbs."""
+    plane = load_profile("arduplane")
+    reference = {option.name: float(option.default or 0.0) for option in plane.schema.options}
+    driven = {**reference, "TKOFF_THR_MINACC": 10.0}
+    bounds = {v.name: v.threshold for v in plane.schema.objectives if v.threshold is not None}
+    lost = {"never_climbed": 1.0, "mission_success": 0.0}
+    alone, with_more = (
+        CounterfactualQuery(plane.model, driven, seen, bounds) for seen in (lost, {**lost, "forced_disarm": 1.0})
+    )
+    assert with_more.p_ok("mission_success", [reference])[0] == alone.p_ok("mission_success", [reference])[0] > 0.9
 
 
 def test_a_stage_passed_speaks_for_the_run(planted: Profile) -> None:
