@@ -19,6 +19,7 @@ from care_core.diagnose.remedies import (
 )
 from care_core.ecosystems.findings import (
     BY_STICK,
+    CLOSED,
     CUT,
     DROPPED,
     KILLED,
@@ -163,7 +164,7 @@ def _checked(named: Iterable[str], findings: Iterable[Finding], run: Run) -> str
     then = f"; then {again(run, upset=True)}"
     if parts:
         return f"{_mended(parts, findings, run)}{then}"
-    if any(one.title in (CUT, DROPPED, KILLED, STOPPED) for one in findings):
+    if any(one.title in (CLOSED, CUT, DROPPED, KILLED, STOPPED) for one in findings):
         return f"{ASK_WHO_CUT}{then}"
     if any(one.title == STRUCK for one in findings):
         return f"{LOOK_AT_ITS_WAY}{then}"

@@ -151,6 +151,7 @@ SHOW_WHY = BY_STICK | {STRUCK, LEANED}
 KILLED = "the kill switch cut the motors in the air"
 DROPPED = "it was disarmed in the air, and fell"
 CUT = "its motors stopped in the air, and it fell"
+CLOSED = "its throttle was closed in the air, and it fell"
 STOPPED = "the emergency switch stopped the motors in the air"
 UNDRIVEN = "the firmware found a crash while its motors were at rest"
 UNPOWERED = "the motors draw no power"

@@ -33,6 +33,18 @@ def test_an_impact_is_after_the_loss_of_control_and_what_follows_it_is_marked() 
     assert all(one.after_impact for one in made.find() if one.onset_s > flight.impact_s)
 
 
+def test_what_climbs_as_it_is_lost_has_not_come_down() -> None:
+    made = Made()
+    made.facts = {"firmware": "ArduPlane V4.5.4 (fd1bcc61)", "vehicle": "fixed wing"}
+    made.table["ATT"]["Roll"][made.after(UP_S + 0.5)] = 120.0
+    height = np.interp(made.t, [UP_S, UP_S + 3, UP_S + 5], [0.0, 6.0, 0.0])
+    for table, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[table][field] = height
+    impact_s = made.flight().impact_s
+    assert impact_s is not None
+    assert impact_s > UP_S + 4
+
+
 def test_a_mission_has_failed_that_fell_though_the_log_ends_armed_and_nothing_was_said_of_it() -> None:
     made = Made()
     falling(made, -60.0, 40.0)

@@ -35,6 +35,18 @@ def test_motors_that_push_against_an_obstacle_tell_nothing_of_themselves(speed_m
     assert "motor" not in [one.kind for one in (finding, *finding.consequences)]
 
 
+@pytest.mark.parametrize(("from_deg", "speed_ms", "is_held"), [(0.0, 0.1, True), (0.0, 0.5, False), (12.0, 0.1, False)])
+def test_a_lean_that_grows_while_it_stands_is_what_holds_it(from_deg: float, speed_ms: float, is_held: bool) -> None:
+    """A steady wind is leant against from the start, and a gust moves what leans against it."""
+    made = Made()
+    lean = np.interp(made.t, [FAILS_S, FAILS_S + 3.0, FAILS_S + 6.0], [from_deg, 16.0, 16.0])
+    lean[made.after(FAILS_S + 6.0)] = from_deg
+    lean[~made.after(UP_S + 1, DOWN_S - 1)] = 0.0
+    made.table["ATT"]["Roll"] = made.table["ATT"]["DesRoll"] = lean
+    made.table["GPS"]["Spd"] = np.full(len(made.t), speed_ms)
+    assert ("blocked" in [one.kind for one in made.find()]) == is_held
+
+
 def test_an_uneven_load_moves_motors_in_pairs_and_is_no_lost_motor() -> None:
     made = Made()
     for output in ("C1", "C3"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from care_core.ecosystems.findings import CUT, DROPPED, every_finding
+from care_core.ecosystems.findings import CLOSED, CUT, DROPPED, every_finding
 from tests.flights import FAILS_S, Made, first
 
 
@@ -57,6 +57,17 @@ def test_motors_that_stop_in_the_air_while_it_is_armed_are_told(pulse_us: float,
     for column in made.table["RCOU"].values():
         column[made.after(FAILS_S)] = pulse_us
     assert (CUT in {one.title for one in every_finding(made.find())}) == is_told
+
+
+@pytest.mark.parametrize(("mode", "opens_s", "is_told"), [(0.0, None, True), (2.0, None, False), (0.0, 51.0, False)])
+def test_a_throttle_that_is_closed_until_it_is_lost_is_told(mode: float, opens_s: float | None, is_told: bool) -> None:
+    made = Made()
+    made.rows["MODE"] = [(0.0, {"ModeNum": mode})]
+    _drop(made, FAILS_S)
+    for column in made.table["RCOU"].values():
+        column[made.after(FAILS_S, opens_s or 200.0)] = 1100.0
+    made.table["ATT"]["Roll"][made.after(FAILS_S + 2)] = 150.0
+    assert (CLOSED in {one.title for one in every_finding(made.find())}) == is_told
 
 
 def test_a_height_that_is_set_anew_when_it_is_disarmed_is_no_fall() -> None:

@@ -63,3 +63,38 @@ def test_the_height_of_its_return_belongs_to_a_mission_that_returns() -> None:
     assert list(mission_height.find(made.flight()))
     made.settings["RTL_ALTITUDE"] = 120.0
     assert not list(mission_height.find(made.flight()))
+
+
+def sunk(least_m: float, *, throttle: float = 1.0, last: float = 20.0) -> Made:
+    """A copter that sinks in the middle of a mission at its height, and rises again."""
+    made = Made()
+    made.rows["MODE"] = [(0.0, {"ModeNum": 3.0})]
+    items = [(1.0, 16.0), (2.0, 16.0), (3.0, last)]
+    made.rows["CMD"] = [
+        (
+            1.0,
+            {"CNum": n, "CId": what, "Lat": -35.0, "Lng": 149.0 + n / 1000, "Alt": HEIGHT_M, "Frame": 3.0, "CTot": 4.0},
+        )
+        for n, what in items
+    ]
+    low = made.after(50.0, 54.0)
+    for table, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[table][field][low] = least_m
+    made.table["CTUN"]["ThO"][low] = throttle
+    return made
+
+
+@pytest.mark.parametrize(
+    ("least_m", "title"),
+    [(-0.2, "it came down to the ground in its mission"), (4.0, "it sank far below its mission"), (9.0, None)],
+)
+def test_a_copter_that_sinks_at_full_throttle_is_told(least_m: float, title: str | None) -> None:
+    assert [one.title for one in mission_height.find(sunk(least_m).flight())] == ([title] if title else [])
+
+
+def test_what_descends_by_itself_or_was_to_land_did_not_sink() -> None:
+    assert not list(mission_height.find(sunk(1.0, throttle=0.3).flight()))
+    landing = sunk(1.0)
+    landing.rows["CMD"][1][1]["CId"] = 21.0
+    landing.rows["CMD"][2][1]["CId"] = 16.0
+    assert not list(mission_height.find(landing.flight()))

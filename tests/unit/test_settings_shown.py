@@ -575,6 +575,9 @@ def test_a_throttle_that_swings_names_the_gain_that_was_raised() -> None:
     flying = made.after(UP_S + 1, DOWN_S - 1)
     made.table["CTUN"]["ThO"][flying] = 0.5 + 0.45 * np.sign(np.sin(8.0 * made.t[flying]))
     assert not [one for one in made.find() if one.parameters]
+    assert "the throttle swings" in [one.title for one in made.find()]
+    made.rows["MODE"] = [(0.0, {"ModeNum": 0.0})]
+    assert "the throttle swings" not in [one.title for one in made.find()]
     made.drive("PSC_ACCZ_D", 0.4, 0.0)
     finding = naming(made, "PSC_ACCZ_D")
     assert (finding.title, finding.wanted) == ("the throttle swings", ())

@@ -57,6 +57,8 @@ _DIPS_S, _HOPS_S = 3.0, 1.0
 """A flight goes on over so short a dip of height or throttle, and is longer than a hop."""
 OFF_GROUND_M = 1.0
 """Height above which a copter touches nothing, whatever its legs."""
+_RISES_S, _RISES_M = 0.5, 0.5
+"""What still climbs so fast has not come down."""
 _GROUND_M = 2.0
 _STRIVING, _STRANDED_S = 0.5, 10.0
 """Throttle that lifts any vehicle that can fly, and how long it may take to do so."""
@@ -528,7 +530,8 @@ class Airborne(Armed):
         if known is None:
             return None
         t, height = known
-        low = (t >= first) & (height < _GROUND_M)
+        rises = np.interp(t + _RISES_S, t, height) - height > _RISES_M
+        low = (t >= first) & (height < _GROUND_M) & ~rises
         return float(t[low][0]) if low.any() else None
 
     @cached_property

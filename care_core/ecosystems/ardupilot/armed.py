@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cached_property
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.instances import FIX
 from care_core.ecosystems.ardupilot.recorded import Recorded
+from care_core.ecosystems.ardupilot.texts import Refusal
 from care_core.ecosystems.spans import Span, during, runs
 from care_core.ecosystems.vehicles import method_words, unrecorded_changes
 from care_core.logs.base import Table, Wanted
@@ -19,6 +21,7 @@ from care_core.numbers import Bools, Floats, median
 READS: Wanted = {
     "ARM": ("ArmState", "Forced", "Method"),
     "STAT": ("Armed", "State"),
+    "SYS_STATUS": ("onboard_control_sensors_enabled", "onboard_control_sensors_health"),
     "CTUN": ("ThO", "Alt", "BAlt"),
     "POS": ("RelHomeAlt",),
     "ATT": ("Roll",),
@@ -45,6 +48,10 @@ _DRIVES = frozenset((*MOTORS.values(), THROTTLE, LEFT, RIGHT))
 _LEAST_PWM, _WORKS_PWM = 1000.0, 150.0
 """Microseconds; so far above the least of an output is more than idling (MOT_SPIN_ARM 0.1 of 1000)."""
 _BY_ITSELF = frozenset(("mission", "return", "guided"))
+_WOULD_ARM = 0x10000000
+"""MAV_SYS_STATUS_PREARM_CHECK, which ArduPilot sends since 4.0."""
+_PLACED = re.compile(r"is using (GPS|external nav|optical flow|range beacons)")
+_UNPLACED = re.compile(r"position estimate|3D fix|waiting for home|no position", re.IGNORECASE)
 
 
 class ArmChange(NamedTuple):
@@ -170,7 +177,34 @@ class Armed(Recorded):
     @cached_property
     def was_refused(self) -> bool:
         """Whether it never armed though that was asked for."""
-        return not self.armed and bool(self.refusals)
+        return not self.armed and bool(self.lasting_refusals)
+
+    @cached_property
+    def lasting_refusals(self) -> tuple[Refusal, ...]:
+        """The refusals without complaints that passed before anybody tried to arm: its word that it would arm came
+        after them and stayed to the end, or its estimator found its place after it missed that."""
+        if self.armed or any(one.was_tried for one in self.refusals):
+            return self.refusals
+        placed_s = max((t for t, text in self.messages if _PLACED.search(text)), default=-math.inf)
+        ready_s = self._would_arm_s
+        return tuple(
+            one
+            for one in self.refusals
+            if one.time_s > ready_s and not (one.time_s < placed_s and _UNPLACED.search(one.why))
+        )
+
+    @property
+    def _would_arm_s(self) -> float:
+        """When its checks before arming had passed for good, as telemetry tells; before the log where it does not."""
+        table = self.one("SYS_STATUS", *READS["SYS_STATUS"])
+        if table is None or not len(table):
+            return -math.inf
+        enabled, healthy = (table[name].astype(np.int64) & _WOULD_ARM > 0 for name in READS["SYS_STATUS"])
+        passes = enabled & healthy
+        if not passes[-1]:
+            return -math.inf
+        failed = np.flatnonzero(~passes)
+        return float(table.t[failed[-1] + 1]) if len(failed) else -math.inf
 
     def drives_itself(self, t: Floats) -> Bools:
         """Which of these times lie in an armed span and a mode of a rover that drives without a pilot."""

@@ -41,8 +41,12 @@ _STILL_MS, _LEANS_FAR_DEG, _STILL_S, _LEANS_ON_DEG = 0.15, 20.0, 5.0, 5.0
 was told to lean: one that a motor fails falls. It began to lean on what holds it from the last of these on."""
 _STANDS_S, _WALKS_MS, _IDLES = 5.0, 1.5, 0.1
 """What stood for so long, no faster than a receiver's speed wanders, with less throttle than taxiing takes."""
+_GROWN_MS, _UPRIGHT_DEG, _GROWN_DEG, _GROWN_S, _GROWS_S = 0.3, 5.0, 10.0, 3.0, 5.0
+"""A lean that grows so far within so long moves what is free, by 1.7 m/s^2, and a gust that asked for it would too."""
 _LIFTS = 0.2
 """Throttle that lifts a light copter, or holds it in a descent; on the ground it idles at half of it."""
+BY_STICK = (0, 1)
+"""Modes of a copter in which the throttle is the pilot's, and its motors idle where it is closed: Stabilize, Acro."""
 _REFUSED_S = 30.0
 """The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
 
@@ -50,6 +54,14 @@ _REFUSED_S = 30.0
 def _lasting(t: Floats, held: Bools, least_s: float) -> tuple[Span, ...]:
     """Spans of at least so many seconds in which something is so."""
     return tuple((a, b) for a, b in runs(t, held, gap_s=1.0) if b - a >= least_s)
+
+
+def _grown(t: Floats, lean: Floats, stands: Bools) -> Iterator[Span]:
+    """Spans in which a lean grew from upright, and stayed, where a vehicle stands, from the last time it was upright."""
+    for start, end in _lasting(t, stands & (lean > _GROWN_DEG), _GROWN_S):
+        upright = t[stands & (lean < _UPRIGHT_DEG) & (t < start) & (t > start - _GROWS_S)]
+        if len(upright):
+            yield float(upright[-1]), end
 
 
 class Flight(Airborne):
@@ -106,14 +118,16 @@ class Flight(Airborne):
         still = lifts & (moved["Spd"] < _STILL_MS)
         rests = _lasting(moved.t, still & (lean > _LEANS_FAR_DEG), _STILL_S)
         leans_on = runs(moved.t, still & (lean > _LEANS_ON_DEG), gap_s=1.0)
-        return tuple((a, b) for a, b in leans_on if any(a <= start <= b for start, _ in rests))
+        rested = tuple((a, b) for a, b in leans_on if any(a <= start <= b for start, _ in rests))
+        up = moved.t > self.flown[0][0] + _GROWS_S
+        return rested or tuple(_grown(moved.t, lean, lifts & up & (moved["Spd"] < _GROWN_MS)))
 
     def refused_for(self, *words: str, but: str | None = None) -> float | None:
         """When arming was first refused with one of these words, and without another, where that still stood at the
         last refusal and it never armed."""
         if not self.was_refused:
             return None
-        complaints = [(one.time_s, one.text.casefold()) for one in self.refusals]
+        complaints = [(one.time_s, one.text.casefold()) for one in self.lasting_refusals]
         named = [
             t for t, text in complaints if any(word in text for word in words) and (but is None or but not in text)
         ]

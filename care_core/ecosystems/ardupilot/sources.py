@@ -134,7 +134,7 @@ def unconnected(flight: Armed, hovering: Sequence[Span]) -> Iterator[Unconnected
     Args:
         hovering: when motors held it in the air.
     """
-    if not flight.armed and not flight.refusals:
+    if not flight.armed and not flight.lasting_refusals:
         return
     yield from _no_packs(flight, hovering)
     receivers = recorded_instances(flight, "GPS", "Status", "NSats")

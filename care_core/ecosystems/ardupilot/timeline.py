@@ -161,9 +161,9 @@ def _refusals(flight: Flight) -> Iterator[Event]:
     armed = [change.time_s for change in _each_once(flight.arm_changes) if change.is_armed]
     last_s = refused[-1].time_s
     if not flight.armed:
-        standing = {one.complaint: one.why for one in refused if one.time_s >= last_s - _STILL_S}
+        standing = {one.complaint: one.why for one in flight.lasting_refusals if one.time_s >= last_s - _STILL_S}
         word = "refusal" if any(one.was_tried for one in refused) else "complaint"
-        what = f"it never armed: {'; '.join(standing.values())}"
+        what = f"it never armed{': ' if standing else ', though its complaints passed'}{'; '.join(standing.values())}"
         yield Event(last_s, "arming", f"{what} ({counted(len(refused), word)})", "MSG")
     for _, several in groupby(refused, key=lambda one: sum(t <= one.time_s for t in armed)):
         complaints = list(several)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.flight import BY_STICK, Flight
 from care_core.ecosystems.base import Limits
-from care_core.ecosystems.findings import CUT, DROPPED
+from care_core.ecosystems.findings import CLOSED, CUT, DROPPED
 from care_core.ecosystems.spans import during, runs
 from care_core.ecosystems.vehicles.motors import motors_of
 from care_core.numbers import Floats
@@ -24,7 +24,8 @@ _CALM_MS = LIMITS.add("descent before it", 2.0, "m/s", "LAND_SPEED_HIGH as shipp
 _STILL_US = LIMITS.add("output above its least that turns no motor", 10.0, "us", "MOT_SPIN_ARM as shipped: 100 us")
 _CUT_S = LIMITS.add("shortest time of motors that stopped", 0.3, "s", "a choice: more than one record")
 _STEP = LIMITS.add("share of the fall in one record", 0.7, "", "a choice: a height that is set anew is one step")
-_LEAST_US, _FEWEST = 1000.0, 3
+_IDLES = LIMITS.add("share of the range at which motors idle", 0.1, "", "MOT_SPIN_ARM as shipped, where not recorded")
+_LEAST_US, _MOST_US, _FEWEST = 1000.0, 2000.0, 3
 """Pulse of a motor that stands, where no parameter tells it, and records of its height that tell of a fall."""
 
 
@@ -44,23 +45,31 @@ def drop_of(flight: Flight) -> Drop | None:
     if flight.height is None:
         return None
     disarmed = [(one.time_s, DROPPED, bool(one.is_forced)) for one in flight.arm_changes if not one.is_armed]
-    stops = sorted([*disarmed, *((t, CUT, False) for t in _cut(flight))])
+    stops = sorted([*disarmed, *((t, title, False) for t, title in _stopped(flight))])
     drops = (_fall(flight.height, *stop) for stop in stops)
     return next((drop for drop in drops if drop is not None), None)
 
 
-def _cut(flight: Flight) -> Iterator[float]:
+def _stopped(flight: Flight) -> Iterator[tuple[float, str]]:
     """When the outputs of all motors of a copter went to their least while it was armed, and stayed there: the least
-    that they turn at in the air is more. Wings carry a QuadPlane without them."""
+    that they turn at in the air is more; or to idling by the pilot's stick, until it was lost. Wings carry a QuadPlane
+    without them."""
     table, motors = flight.one("RCOU"), motors_of(flight.settings, flight.motor_outputs)
     columns = [f"C{motor.output}" for motor in motors]
     if not flight.is_copter or table is None or not columns or not set(columns) <= table.columns.keys():
         return
     least = flight.setting("MOT_PWM_MIN", "Q_M_PWM_MIN") or _LEAST_US
-    still = np.max([table[column] for column in columns], axis=0) <= least + _STILL_US
-    for start, end in runs(table.t, still & during(flight.armed, table.t)):
+    idling_us = ((flight.setting("MOT_PWM_MAX") or _MOST_US) - least) * (flight.setting("MOT_SPIN_ARM") or _IDLES)
+    highest = np.max([table[column] for column in columns], axis=0)
+    is_armed = during(flight.armed, table.t)
+    for start, end in runs(table.t, is_armed & (highest <= least + _STILL_US)):
         if end - start >= _CUT_S:
-            yield start
+            yield start, CUT
+    by_stick = np.isin(flight.modes_at(table.t), BY_STICK)
+    lost = flight.lost_control_s if flight.lost_control_s is not None else flight.impact_s
+    for start, end in runs(table.t, is_armed & by_stick & (highest <= least + idling_us + _STILL_US)):
+        if lost is not None and end - start >= _CUT_S and start <= lost <= end:
+            yield start, CLOSED
 
 
 def _fall(height: tuple[Floats, Floats], at: float, title: str, is_forced: bool) -> Drop | None:

@@ -57,7 +57,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             severity="critical",
             evidence=f"{fall.height_m:.1f} m up, and it lost {fall.fell_m:.1f} m of that within a second or two"
             + ("; somebody forced it, for what came before" if fall.is_forced else ""),
-            source=f"{'ARM' if fall.title == DROPPED else 'RCOU'}; the vehicle's height",
+            source=f"{'ARM' if fall.title == DROPPED else 'RCOU, MODE'}; the vehicle's height",
             suspect="operation",
             probability=_FORCED_P if fall.is_forced else _DROPPED_P,
         )

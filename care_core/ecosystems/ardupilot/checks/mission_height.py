@@ -1,4 +1,4 @@
-"""A vehicle that flies far above all that its mission asks for.
+"""A vehicle that flies far above all that its mission asks for, or sinks far below it with all the thrust it has.
 
 A plane adds ALT_OFFSET to the height of every item (ArduPlane/altitude.cpp, `mission_alt_offset`): where it is far off,
 the mission is flown far above the site, and what lands, or waits for its height, never does.
@@ -12,11 +12,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.held_missions import PLACES, RETURN, TAKEOFF, HeldMission
+from care_core.ecosystems.ardupilot.held_missions import LAND, PLACES, RETURN, TAKEOFF, HeldMission
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.spans import during
+from care_core.ecosystems.spans import Span, during
 from care_core.ecosystems.vehicles import flies, way_of
 from care_core.logs.base import Wanted
 from care_core.run import shown
@@ -29,6 +29,12 @@ _LASTS_S = LIMITS.add("shortest time of it", 10.0, "s", "a choice: a receiver th
 _LEAST_OFFSET_M = LIMITS.add("offset that lifts a mission out of its limits", 50.0, "m", "half of what is told here")
 _SURE_P = LIMITS.add("probability of the offset", 0.97, "", "it is what the height says")
 _LIKELY_P = LIMITS.add("probability that it was set to", 0.6, "", "a choice: else its height is false")
+_BELOW = LIMITS.add("height below the mission's lowest item, as a share of it", 0.5, "", "a choice: no corner costs it")
+_BELOW_M = LIMITS.add("and in metres", 2.0, "m", "a choice: heights drift by less")
+_SANK_S = LIMITS.add("shortest time of that", 1.5, "s", "a choice: a height that is set anew is back at once")
+_SPENT = LIMITS.add("throttle with which it sinks", 0.95, "", "a choice: all that there is; who descends takes less")
+_SANK_P = LIMITS.add("probability that its thrust was lost by itself", 0.1, "", "a choice: it is what a cause leads to")
+_TOUCHES_M = LIMITS.add("height at which it is on the ground", 0.3, "m", "a choice: a leg's length")
 _OFFSET = "ALT_OFFSET"
 _RELATIVE = 3
 """MAV_FRAME_GLOBAL_RELATIVE_ALT: above home."""
@@ -37,7 +43,12 @@ _RETURN_M = "RTL_ALTITUDE", "RTL_ALT_M"
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """The first time that it flies a mission so far above it."""
+    """The first time that it flies a mission so far above it, and that it sinks so far below it."""
+    yield from _sank(flight)
+    yield from _flew_above(flight)
+
+
+def _flew_above(flight: Flight) -> Iterator[Finding]:
     known = flight.estimated_height
     if known is None or not flies(flight.mode_kind) or flight.lost_control_s is not None:
         return
@@ -53,6 +64,56 @@ def find(flight: Flight) -> Iterator[Finding]:
             start, end = spans[0][0], spans[-1][1]
             yield _finding(flight, start, end, float(np.max(height[(t >= start) & (t <= end)])), highest)
             return
+
+
+def _sank(flight: Flight) -> Iterator[Finding]:
+    """The times that a copter sank in the middle of its mission, with all the thrust it had, and rose again."""
+    known, driven = flight.estimated_height, flight.throttle
+    if known is None or driven is None or not flight.is_copter or flight.lost_control_s is not None:
+        return
+    t, height = known
+    spent = np.interp(t, *driven) > _SPENT
+    for mission, until_s in _flown(flight):
+        lowest = _lowest_m(mission)
+        if lowest is None or lowest < 2 * _BELOW_M:
+            continue
+        held = (t >= mission.since_s) & (t < until_s) & during(flight.armed, t)
+        high = t[held & (height > lowest - _BELOW_M / 2)]
+        if not len(high):
+            continue
+        low = held & (height < min(_BELOW * lowest, lowest - _BELOW_M)) & (t > high[0]) & (t < high[-1])
+        by_itself = np.array([way_of(flight.mode_kind, int(mode)) == "mission" for mode in flight.modes_at(t)])
+        if spans := [
+            span for span in lasting(t, low & by_itself, _SANK_S) if spent[(t >= span[0]) & (t <= span[1])].any()
+        ]:
+            yield _sinking(spans, float(min(height[during(spans, t)])), lowest)
+            return
+
+
+def _lowest_m(mission: HeldMission) -> float | None:
+    """What a mission asks for at least on its way, above home; None where it lands on it, or its heights are not all
+    told so."""
+    numbers = [number for number, one in mission.items.items() if one.command in PLACES]
+    asked = [mission.items[number] for number in numbers]
+    lands = (number for number, one in mission.items.items() if one.command == LAND)
+    if not asked or any(one.frame != _RELATIVE for one in asked) or any(number < numbers[-1] for number in lands):
+        return None
+    return min(one.alt_m for one in asked)
+
+
+def _sinking(spans: list[Span], least_m: float, lowest_m: float) -> Finding:
+    touched = least_m < _TOUCHES_M
+    return Finding(
+        kind="thrust",
+        title="it came down to the ground in its mission" if touched else "it sank far below its mission",
+        onset_s=spans[0][0],
+        end_s=spans[-1][1],
+        severity="critical",
+        evidence=f"{least_m:.1f} m up at full throttle, where the mission asks for {lowest_m:.0f} m at least"
+        + (f"; {len(spans)} times" if len(spans) > 1 else ""),
+        source="POS.RelHomeAlt, CMD, CTUN.ThO",
+        probability=_SANK_P,
+    )
 
 
 def _flown(flight: Flight) -> Iterator[tuple[HeldMission, float]]:
@@ -92,4 +153,10 @@ def _finding(flight: Flight, start: float, end: float, reached_m: float, highest
     )
 
 
-CHECK = Check("mission height", "a vehicle that flies far above its mission", READS, LIMITS, find)
+CHECK = Check(
+    "mission height",
+    "a vehicle that flies far above its mission, or sinks far below it at full throttle",
+    READS,
+    LIMITS,
+    find,
+)

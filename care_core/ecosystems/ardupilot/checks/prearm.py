@@ -41,7 +41,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     """The refusal that lasted, where no arming followed it."""
     if flight.armed:
         return
-    refusals, lasting = flight.refusals, standing(flight)
+    refusals, lasting = flight.lasting_refusals, standing(flight)
     if not lasting:
         return
     counts, plain = Counter(one.complaint for one in lasting), {one.complaint: one.plain for one in lasting}

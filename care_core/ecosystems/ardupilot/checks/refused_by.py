@@ -101,7 +101,8 @@ class _Held(NamedTuple):
 def standing(flight: Flight) -> tuple[Refusal, ...]:
     """The refusals that stood when arming was last refused. What several attempts to arm no longer told had passed: the
     estimator that was still starting, a gyro that was not yet quiet."""
-    late = [one for one in flight.refusals if flight.refusals[-1].time_s - one.time_s < _REPEATED_S]
+    lasting = flight.lasting_refusals
+    late = [one for one in lasting if lasting[-1].time_s - one.time_s < _REPEATED_S]
     told = {one.why: one.time_s for one in late}
     times = sorted(one.time_s for one in late)
     rounds = [t for before, t in pairwise((-math.inf, *times)) if t - before > _ONE_ROUND_S]

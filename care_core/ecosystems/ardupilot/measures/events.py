@@ -37,7 +37,7 @@ _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
 
 def last_refusals(mission: Mission) -> list[Refusal]:
     """The complaints that still stood when arming was last refused, each once, latest time."""
-    refusals = flight_of(mission).refusals
+    refusals = flight_of(mission).lasting_refusals
     attempts = [one for one in refusals if one.was_tried] or list(refusals)
     standing = {one.why: one for one in refusals if one.time_s >= attempts[-1].time_s - _STILL_S}
     return sorted(standing.values(), key=lambda one: (one.time_s, one.text))
@@ -45,7 +45,7 @@ def last_refusals(mission: Mission) -> list[Refusal]:
 
 def refused_for(mission: Mission) -> str:
     """What stood when arming was last refused, a few of it in words; empty where nothing was refused."""
-    if not flight_of(mission).refusals:
+    if not flight_of(mission).lasting_refusals:
         return ""
     told = {one.complaint: one.why for one in last_refusals(mission)}
     return listed(list(told.values())[:_FEW])
