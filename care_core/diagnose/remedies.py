@@ -50,6 +50,10 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
     (rf"too little thrust|hovering takes|{re.escape(CAME_DOWN)}", _LIFT),
     (re.escape(UNPOWERED), "check that the ESCs have power and that the propellers are fitted"),
     (
+        "the throttle swings",
+        "look at the gains of the height control (PSC_ACCZ, PSC_VELZ) and at what tells it its height, in a low hover",
+    ),
+    (
         "strong vibration",
         "balance or change the propellers, and look for loose mounts and for cables that touch the autopilot",
     ),

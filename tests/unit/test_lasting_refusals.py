@@ -56,3 +56,11 @@ def test_a_place_that_was_found_settles_that_it_was_missed() -> None:
     assert not refused(on_the_ground((2.0, "PreArm: Need Position Estimate"), found))
     assert refused(on_the_ground((2.0, "PreArm: Compass not calibrated"), found))
     assert refused(on_the_ground((9.5, "PreArm: Need Position Estimate"), found))
+
+
+def test_a_copter_without_a_frame_would_not_arm() -> None:
+    made = on_the_ground((2.0, "ArduCopter V4.5.4"))
+    assert not refused(made)
+    made.settings["FRAME_CLASS"] = 0
+    (finding,) = refused(made)
+    assert (finding.severity, finding.parameters) == ("warning", ("FRAME_CLASS",))

@@ -500,6 +500,14 @@ def test_a_drive_that_never_is_faster_whatever_is_commanded_has_its_limit(tmp_pa
     assert "never was faster than 0.30 m/s" in finding.evidence
 
 
+def test_no_greatest_speed_is_told_that_is_less_than_it_went(tmp_path: Path) -> None:
+    def slowly(message: Any, _time_s: float) -> None:
+        message.twist.twist.linear.x *= 0.2
+
+    (said,) = [one for one in looked_at(changed(ODOMETRY, slowly), tmp_path).timeline if "m in all" in one.text]
+    assert "at most" not in said.text
+
+
 def test_the_greatest_speed_that_is_told_lasted(tmp_path: Path) -> None:
     (said,) = [one for one in looked_at(changed(ODOMETRY, in_spikes), tmp_path).timeline if "at most" in one.text]
     assert "0.5" in said.text.partition("m in all, ")[2]
@@ -738,6 +746,15 @@ def test_speeds_that_no_position_gives_are_told(tmp_path: Path) -> None:
     assert (finding.title, finding.severity) == ("odometry tells impossible speeds", "warning")
     assert finding.onset_s == pytest.approx(20.0, abs=0.2)
     assert finding.evidence.startswith("4 of 200 messages: up to 37.0 m/s, its positions give 0.5 m/s at most, up to")
+
+
+def test_a_single_impossible_speed_is_noted(tmp_path: Path) -> None:
+    def once(message: Any, time_s: float) -> None:
+        if 19.9 < time_s < 20.1:
+            far_too_fast(message, time_s)
+
+    (finding,) = looked_at(changed(ODOMETRY, once), tmp_path).findings
+    assert (finding.severity, finding.evidence[:8]) == ("info", "1 of 200")
 
 
 def in_turn(odometry: Any, time_s: float) -> None:

@@ -57,7 +57,7 @@ def _lasting(t: Floats, held: Bools, least_s: float) -> tuple[Span, ...]:
 
 
 def _grown(t: Floats, lean: Floats, stands: Bools) -> Iterator[Span]:
-    """Spans in which a lean grew from upright, and stayed, where a vehicle stands, from the last time it was upright."""
+    """Spans in which a lean grew from upright where a vehicle stands, and stayed, from when it was last upright."""
     for start, end in _lasting(t, stands & (lean > _GROWN_DEG), _GROWN_S):
         upright = t[stands & (lean < _UPRIGHT_DEG) & (t < start) & (t > start - _GROWS_S)]
         if len(upright):

@@ -43,6 +43,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     refusals, lasting = flight.lasting_refusals, standing(flight)
     if not lasting:
+        yield from _without_frame(flight)
         return
     counts, plain = Counter(one.complaint for one in lasting), {one.complaint: one.plain for one in lasting}
     most = max(counts, key=lambda one: counts[one])
@@ -65,6 +66,23 @@ def find(flight: Flight) -> Iterator[Finding]:
     )
     blamed = (one for one in refusing(flight) if one.is_shown or not by_operator or one.name.startswith(_CHANNELS))
     yield _blaming(finding, tuple(blamed))
+
+
+def _without_frame(flight: Flight) -> Iterator[Finding]:
+    """A copter whose frame nobody chose: it mixes no motor and never arms (AP_MotorsMatrix::setup_motors)."""
+    if flight.kind == "copter" and flight.setting("FRAME_CLASS") == 0:
+        yield Finding(
+            kind="prearm",
+            title="arming would be refused: no frame is chosen",
+            onset_s=0.0,
+            end_s=flight.end_s,
+            severity="warning",
+            evidence="FRAME_CLASS is 0: no motor is mixed; set it to the frame that is built (1: quad)",
+            source="PARM; AP_MotorsMatrix",
+            suspect="parameter",
+            probability=_SURE_P,
+            parameters=("FRAME_CLASS",),
+        )
 
 
 def _blaming(finding: Finding, blamed: tuple[Refusing, ...]) -> Finding:

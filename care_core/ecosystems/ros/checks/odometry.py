@@ -29,6 +29,8 @@ _SPIKES = "drivers that repeat a pose make up to 8 times the speed, 3 m/s, of th
 BEYOND = LIMITS.add("speed against the most that positions give", 10.0, "", _SPIKES)
 JUMPS_MPS = LIMITS.add("speed beyond that", 3.0, "m/s", _SPIKES)
 JUMPS_RADPS = LIMITS.add("turn beyond that", 8.0, "rad/s", "a choice: of a robot that turns by 1 rad/s")
+_SINGLE = LIMITS.add("such messages that are only noted", 3, "", "a choice: a wheel that slips once misleads nothing")
+_SINGLE_SHARE = LIMITS.add("and as a share of all", 0.01, "", "the same")
 BUNCHED = LIMITS.add("step of stamps in a bunch, of the usual one", 0.05, "", "what is divided by it grows as much")
 JUMP_M = LIMITS.add("step beyond what speed and time allow", 0.3, "m", f"{_HEALTHY}: at most 0.07 m")
 JUMP_AT_REST_M = LIMITS.add("the same of a robot that stands", 0.15, "m", f"{_HEALTHY}: at most 0.07 m of any")
@@ -162,13 +164,14 @@ def _impossible(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
         for (speeds, _, unit), known, where in zip(told, most, bad, strict=True)
         if where.any()
     ]
+    is_single = len(rows) <= min(_SINGLE, _SINGLE_SHARE * len(table))
     bunched = "; its stamps come in bunches" if _in_bunches(odometry) else ""
     yield Finding(
         kind="localisation",
         title="odometry tells impossible speeds",
         onset_s=float(table.t[rows[0]]),
         end_s=float(table.t[rows[-1]]),
-        severity="warning",
+        severity="info" if is_single else "warning",
         evidence=f"{len(rows)} of {len(table)} messages: {', '.join(words)}{bunched}",
         source=f"{odometry.topic}: twist against position",
         probability=0.9,
