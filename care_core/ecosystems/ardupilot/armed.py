@@ -51,6 +51,8 @@ _BY_ITSELF = frozenset(("mission", "return", "guided"))
 _WOULD_ARM = 0x10000000
 """MAV_SYS_STATUS_PREARM_CHECK, which ArduPilot sends since 4.0."""
 _PLACED = re.compile(r"is using (GPS|external nav|optical flow|range beacons)")
+_STARTS_S = 10.0
+"""An estimator that starts finds its place so soon; who waits longer for it may have been denied a start meanwhile."""
 _UNPLACED = re.compile(r"position estimate|3D fix|waiting for home|no position", re.IGNORECASE)
 
 
@@ -190,7 +192,7 @@ class Armed(Recorded):
         return tuple(
             one
             for one in self.refusals
-            if one.time_s > ready_s and not (one.time_s < placed_s and _UNPLACED.search(one.why))
+            if one.time_s > ready_s and not (0 < placed_s - one.time_s < _STARTS_S and _UNPLACED.search(one.why))
         )
 
     @property
