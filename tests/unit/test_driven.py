@@ -122,6 +122,17 @@ def test_an_output_off_its_middle_drives_it_while_it_is_disarmed(trim: float, mo
     assert told == ([(("SERVO1_TRIM", 1500.0),)] if moves and trim != 1500.0 else [])
 
 
+@pytest.mark.parametrize(("speed_ms", "evenly", "trim", "is_told"), [
+    (0.2, True, 1505.0, True), (0.05, True, 1505.0, False), (0.2, False, 1505.0, False), (0.2, True, 1500.0, False)
+])  # fmt: skip
+def test_a_rover_that_creeps_off_evenly_is_told(speed_ms: float, evenly: bool, trim: float, is_told: bool) -> None:
+    before = (T < 10) if evenly else (T < 10) & (T % 2 < 1)
+    later = np.where(T >= 115, speed_ms, 0.0)  # it creeps on once it is disarmed again
+    speed = np.where(before, speed_ms, later)
+    flight = skid(speed, np.zeros_like(T), np.zeros_like(T), np.full_like(T, trim), SERVO1_TRIM=trim)
+    assert bool(list(standing.CHECK.find(flight))) == is_told
+
+
 @pytest.mark.parametrize(("delay", "severity"), [(30.0, "critical"), (8.0, "warning"), (0.0, None)])
 def test_it_stands_as_long_as_the_delay_before_it_turns_on_the_spot(delay: float, severity: str | None) -> None:
     stands = (T >= 40) & (40 + delay >= T)

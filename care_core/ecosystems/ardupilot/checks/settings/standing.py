@@ -15,8 +15,8 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.spans import during, runs
-from care_core.logs.base import Wanted
+from care_core.ecosystems.spans import Span, during, runs
+from care_core.logs.base import Table, Wanted
 from care_core.metadata.output_functions import LEFT, RIGHT, STEERING, THROTTLE
 from care_core.run import shown
 
@@ -30,6 +30,11 @@ _MOVES_MS = LIMITS.add("speed of a rover that drives", 0.5, "m/s", "a choice: ab
 _TURNS_DPS = LIMITS.add("turn rate of one that turns on the spot", 10.0, "deg/s", "a choice: far above a gyro's drift")
 _MOVES_S = LIMITS.add("time for which it moves while disarmed", 5.0, "s", "a choice: who pushes it stops sooner")
 _OFF_US = LIMITS.add("output off its middle", 50.0, "us", "trims that are right are within 26 in 541 drives")
+_CREEPS_MS = LIMITS.add(
+    "even speed of a rover that creeps while disarmed", 0.1, "m/s", "a choice: above the noise at rest"
+)
+_CREEPS_S = LIMITS.add("time for which it creeps", 8.0, "s", "a choice: it is metres off where it was set down")
+_EVEN_MS = LIMITS.add("change of an even speed", 0.1, "m/s", "a choice: who pushes is not as even")
 _STANDS_MS = LIMITS.add("speed of a rover that stands", 0.2, "m/s", "a choice: below what it can hold")
 _STANDS_DPS = LIMITS.add("turn rate of a rover that stands", 2.0, "deg/s", "a choice: above what a gyro wanders by")
 _AS_LONG = LIMITS.add("share of the delay by which a stand differs", 0.1, "", "a choice: it slows down and speeds up")
@@ -57,10 +62,13 @@ def _driven_off(flight: Flight) -> Iterator[Finding]:
         return
     rate = np.interp(moved.t, turned.t, turned["TurnRate"])
     moves = (np.abs(moved["Speed"]) > _MOVES_MS) | (np.abs(rate) > _TURNS_DPS)
-    spans = lasting(moved.t, moves & ~during(flight.armed, moved.t), _MOVES_S)
-    off = [n for n in range(1, 15) if flight.setting(f"SERVO{n}_FUNCTION") in _DRIVES and _trim_is_off(flight, n)]
+    spans, least_us = lasting(moved.t, moves & ~during(flight.armed, moved.t), _MOVES_S), float(_OFF_US)
+    if not spans:
+        spans, least_us = _creeping(flight, moved), 0.0
+    drives = [n for n in range(1, 15) if flight.setting(f"SERVO{n}_FUNCTION") in _DRIVES and f"C{n}" in told.columns]
+    off = [n for n in drives if _trim_is_off(flight, n, least_us)]
     held = during(spans, told.t)
-    driven = [n for n in off if f"C{n}" in told.columns and (np.abs(told[f"C{n}"][held] - _MIDDLE_US) > _OFF_US).any()]
+    driven = [n for n in off if (np.abs(told[f"C{n}"][held] - _MIDDLE_US) > least_us).any()]
     if not spans or not driven:
         return
     names = [f"SERVO{n}_TRIM" for n in driven]
@@ -72,7 +80,7 @@ def _driven_off(flight: Flight) -> Iterator[Finding]:
         onset_s=spans[0][0],
         end_s=spans[-1][1],
         severity="critical",
-        evidence=f"for {sum(b - a for a, b in spans):.0f} s, at up to {speed:.1f} m/s (limit {_MOVES_S:g} s): {values}",
+        evidence=f"for {sum(b - a for a, b in spans):.0f} s, at up to {speed:.1f} m/s (limit {_MOVES_S if least_us else _CREEPS_S:g} s): {values}",
         source="RCOU, THR.Speed, STER.TurnRate; PARM",
         suspect="parameter",
         probability=_SURE_P,
@@ -81,10 +89,16 @@ def _driven_off(flight: Flight) -> Iterator[Finding]:
     )
 
 
-def _trim_is_off(flight: Flight, output: int) -> bool:
+def _creeping(flight: Flight, moved: Table) -> list[Span]:
+    """When it crept at an even speed while it was disarmed, which nobody pushes a rover at."""
+    crept = lasting(moved.t, (np.abs(moved["Speed"]) > _CREEPS_MS) & ~during(flight.armed, moved.t), _CREEPS_S)
+    return [span for span in crept if np.ptp(moved["Speed"][during([span], moved.t)]) < _EVEN_MS]
+
+
+def _trim_is_off(flight: Flight, output: int, least_us: float) -> bool:
     name = f"SERVO{output}_TRIM"
     trim = flight.setting(name)
-    return trim is not None and flight.default_left(name) is not None and abs(trim - _MIDDLE_US) > _OFF_US
+    return trim is not None and flight.default_left(name) is not None and abs(trim - _MIDDLE_US) > least_us
 
 
 def _waits(flight: Flight) -> Iterator[Finding]:
