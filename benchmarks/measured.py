@@ -3,10 +3,10 @@
     python -m benchmarks.measured FAULTS... [--most N]
 
 Each folder holds failed missions of copters or rovers with `truth.jsonl`: which resets were really flown under the
-conditions of the failure, and which repaired it. Every failure is told with all checks, without those of one
-measurement at a time, without the refusals to arm, and without all of these: what is left then is the causal map, the
-screening flights and the profile. Printed is in how many the first of the hypotheses, and one of the first three, is a
-parameter (or a failed part) that repairs the mission.
+conditions of the failure, and which repaired it. Every failure is told with all checks; without those of one
+measurement at a time, and without the refusals to arm; with one of these alone; and without all of them: what is left
+then is the causal map, the screening flights and the profile. Printed is in how many the first of the hypotheses, and
+one of the first three, is a parameter (or a failed part) that repairs the mission.
 """
 
 from __future__ import annotations
@@ -60,10 +60,14 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=10**9, help="so many failures of each")
     asked = parser.parse_args()
     os.environ["CARE_HISTORY"] = "off"  # simulated vehicles share a name, and a run of one is no good run of another
-    ways = {"all checks": (), **{f"without {name}": (name,) for name in MEASUREMENTS}, "without these": MEASUREMENTS}
+    ways: dict[str, Collection[str]] = {"all checks": ()}
+    ways |= {f"without {name}": (name,) for name in MEASUREMENTS}
+    ways |= {f"{name} alone": MEASUREMENTS.keys() - {name} for name in MEASUREMENTS}
+    ways |= {"none of these": MEASUREMENTS.keys()}
     for way, without in ways.items():
-        told = [hits(folder, asked.most, tuple(without)) for folder in asked.folders]
-        print(f"  {way:18s}", "   ".join(f"{n} failures: first {first}, in three {three}" for n, first, three in told))
+        told = [hits(folder, asked.most, without) for folder in asked.folders]
+        line = "   ".join(f"{n} failures: first {first}, in three {three}" for n, first, three in told)
+        print(f"  {way:18s} {line}", flush=True)
 
 
 if __name__ == "__main__":

@@ -62,9 +62,9 @@ def _driven_off(flight: Flight) -> Iterator[Finding]:
         return
     rate = np.interp(moved.t, turned.t, turned["TurnRate"])
     moves = (np.abs(moved["Speed"]) > _MOVES_MS) | (np.abs(rate) > _TURNS_DPS)
-    spans, least_us = lasting(moved.t, moves & ~during(flight.armed, moved.t), _MOVES_S), float(_OFF_US)
+    spans, least_s, least_us = lasting(moved.t, moves & ~during(flight.armed, moved.t), _MOVES_S), _MOVES_S, _OFF_US
     if not spans:
-        spans, least_us = _creeping(flight, moved), 0.0
+        spans, least_s, least_us = _creeping(flight, moved), _CREEPS_S, 0.0
     drives = [n for n in range(1, 15) if flight.setting(f"SERVO{n}_FUNCTION") in _DRIVES and f"C{n}" in told.columns]
     off = [n for n in drives if _trim_is_off(flight, n, least_us)]
     held = during(spans, told.t)
@@ -80,7 +80,7 @@ def _driven_off(flight: Flight) -> Iterator[Finding]:
         onset_s=spans[0][0],
         end_s=spans[-1][1],
         severity="critical",
-        evidence=f"for {sum(b - a for a, b in spans):.0f} s, at up to {speed:.1f} m/s (limit {_MOVES_S if least_us else _CREEPS_S:g} s): {values}",
+        evidence=f"for {sum(b - a for a, b in spans):.0f} s, at up to {speed:.1f} m/s (limit {least_s:g} s): {values}",
         source="RCOU, THR.Speed, STER.TurnRate; PARM",
         suspect="parameter",
         probability=_SURE_P,
