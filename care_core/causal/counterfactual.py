@@ -204,9 +204,9 @@ class CounterfactualQuery(Record, eq=False, dict=True):
     def _all_stages(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Floats:
         p_ok = np.ones(len(configs))
         runs = [(seen, True) for seen in (self.observed, *self.repeats)]
-        ended: list[str] = []
+        graph, ended = self.model.graph, list[str]()
         for stage in outcome.stages:
-            follows = stage.variable in self.model.graph.descendants(*ended)
+            follows = stage.variable in graph.descendants(*ended)
             passed = []
             for i, (seen, reached) in enumerate(runs):
                 ok = self._passed(outcome.objective, stage, seen)
@@ -214,7 +214,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
                     ok = None  # what came after the failure, or of it, says nothing about this stage
                 passed += [] if ok is None else [ok]
                 runs[i] = seen, reached and ok is not False
-            ended += [stage.variable] if False in passed else []
+            ended += [stage.variable] if False in passed and stage.variable in graph.nodes else []
             p_ok *= self._stage_probability(outcome.objective, stage, passed, configs)
         return p_ok
 

@@ -14,6 +14,7 @@ import numpy as np
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import columns
 from care_core.causal.model import Model
+from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Need
 from care_core.diagnose.reference import Reference
 from care_core.profile.schema import Schema
@@ -25,6 +26,8 @@ from care_core.variables import Threshold, Variable
 UNLIKE = 4.0
 """A length that the mission asks for may be so many times larger or smaller than any that training saw: as far as that
 what physics says of the rest is believed, where the profile fits only in part."""
+_FIFTIETH = 2.054 / 1.282
+"""Standard normal quantiles of one in fifty and one in ten: a need's interval is even in its logarithm."""
 ANOTHER_VEHICLE = 1.5
 """The same of what physics reads of the vehicle."""
 
@@ -54,10 +57,17 @@ def limits_of(run: Run, schema: Schema, model: Model, reference: Reference, fixe
         if why := next(_doubts(objective, run, schema, model), ""):
             unknown[name] = Unavailable(why, f"give this mission's bound with --threshold {name}=VALUE")
         elif need := need_of(name, reference, schema, model):
-            needs[name], bounds[name] = need, limit(relative, need)
+            needs[name] = replace(need, is_own=_is_driven(reference, run))
+            bounds[name] = limit(relative, needs[name])
             if why := _excused(objective, run, bounds[name], reference, schema, model):
                 unknown[name] = Unavailable(why, f"give this mission's bound with --threshold {name}=VALUE")
     return Limits(bounds, needs, unknown)
+
+
+def _is_driven(reference: Reference, run: Run) -> bool:
+    """Whether a run was driven as the reference, as far as is known of its options."""
+    known = [name for name in reference.config if name in run.config]
+    return bool(known) and not deviating({name: run.config[name] for name in known}, reference.config)
 
 
 def limits_ahead(schema: Schema, model: Model, reference: Reference, fixed: Container[str]) -> dict[str, Threshold]:
@@ -80,11 +90,14 @@ def need_of(name: str, reference: Reference, schema: Schema, model: Model) -> Ne
 
 def limit(relative: Threshold, need: Need) -> Threshold:
     """The bound of a multiple of a need. What one in ten runs of the reference configuration exceeds is no fault,
-    unless the multiple is the operator's."""
+    unless the multiple is the operator's; of a run that was driven as the reference, what one in fifty exceeds: nothing
+    of it is off that could have brought it there."""
     usual = relative.for_need(need.value)
     if relative.source is not None:
         return usual
     worst = need.high if usual.op in ("<=", "<") else need.low
+    if need.is_own and need.low > 0:
+        worst = need.value * (worst / need.value) ** _FIFTIETH
     return usual if usual.met(worst) else Threshold(usual.op, float(f"{worst:.4g}"))
 
 

@@ -25,6 +25,13 @@ class Need(Record):
     value: float
     low: float
     high: float
+    is_own: bool = False
+    """Whether this run was driven as the reference."""
+
+    @property
+    def exceeded(self) -> str:
+        """How often the reference takes more than a limit that its spread sets."""
+        return "one time in fifty" if self.is_own else "one time in ten"
 
 
 class ObjectiveResult(Record):
@@ -83,12 +90,11 @@ class ObjectiveResult(Record):
         if self.threshold.value == least:
             allowed = f"{least:g} {self.variable.unit}".rstrip()
             return f"{allowed} is always allowed; the reference configuration needs {need} for this mission"
+        if self.threshold != self.variable.relative.for_need(self.need.value):
+            often = f"{self.need.exceeded} as much as this limit"
+            return f"the reference configuration needs {need} for this mission, and {often}"
         if self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
-        if self.threshold != self.variable.relative.for_need(self.need.value):
-            return (
-                f"the reference configuration needs {need} for this mission, and one time in ten as much as this limit"
-            )
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
 
 

@@ -26,7 +26,7 @@ def test_circles_that_are_too_wide_are_the_cause_by_physics_and_their_radius_is_
     assert [node.name for node in cause.path] == ["WP_LOITER_RAD", "mission_time"]
     assert cause.path[0].support is None, "no resample is asked about physics"
     assert not any("resamples" in note.text or "seen in training" in note.text for note in cause.notes)
-    assert cause.p_fixed == diagnosis.fix.p_fixed
+    assert cause.p_fixed == pytest.approx(diagnosis.fix.p_fixed)
 
 
 def test_a_refusal_that_reads_an_option_puts_it_back() -> None:

@@ -55,6 +55,14 @@ def test_what_one_in_ten_runs_of_the_reference_exceeds_is_no_fault() -> None:
     assert limit(Threshold(">=", ratio=0.8), unsure) == Threshold(">=", 6.0)
 
 
+def test_what_was_driven_as_the_reference_has_what_one_in_fifty_of_its_runs_takes() -> None:
+    own = Need(10.0, 6.0, 16.0, is_own=True)
+    assert limit(RATIO, own).value == pytest.approx(10.0 * 1.6 ** (2.054 / 1.282), rel=1e-3)
+    assert limit(Threshold(">=", ratio=0.8), own).value == pytest.approx(10.0 * 0.6 ** (2.054 / 1.282), rel=1e-3)
+    assert limit(replace(RATIO, source="site.yaml"), own) == Threshold("<=", 13.0)
+    assert limit(RATIO, Need(10.0, 9.5, 10.5, is_own=True)) == Threshold("<=", 13.0)
+
+
 def test_the_speed_of_a_robot_that_nothing_tells_gives_no_limit(planted: Profile) -> None:
     own = with_variable(TRAVELLING, replace(SCHEMA.variables["speed"], parameters=("SPEED",), ceiling=True))
     run = planted_run(speed=0.4)
