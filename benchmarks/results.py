@@ -68,6 +68,12 @@ BENCHMARKS = (
         "calibration error <= 0.05; fewest missions until repaired",
         "largest deviation; everything at its reference",
     ),
+    Benchmark(
+        "measured",
+        "benchmarks.measured {shared}/data/anyparam",
+        "cause among the first three in 70 % of any parameters",
+        "without each measurement; each alone",
+    ),
     Benchmark("fixes", "benchmarks.fixes", "suggested values do as well as resets", "reset to the reference"),
     Benchmark(
         "paper", "care_tui evaluate husky-care --faults {shared}/data/care", "F1 of the paper's rule 0.81", "CBI"

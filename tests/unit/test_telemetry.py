@@ -113,3 +113,10 @@ def test_a_vehicle_that_is_heard_no_more_in_the_air_is_told_and_its_flight_ends_
     assert [one.text for one in health.timeline if one.time_s > 85.0 and "heard no more" in one.text]
     assert model.log.duration_s > 150.0
     assert max(one.end_s for one in every_finding(health.findings)) < 95.0
+
+
+def test_one_that_is_heard_no_more_before_it_armed_is_told_in_the_timeline(tmp_path: Path) -> None:
+    path = until(write_tlog(tmp_path / "a.tlog", SAMPLE, np.random.default_rng(0)), 12.0)
+    timeline = examine(run_model(open_log(path))).timeline
+    (said,) = [one.text for one in timeline if "heard no more" in one.text]
+    assert said.startswith("the vehicle is heard no more; the station records for ")

@@ -391,10 +391,14 @@ def _clock(flight: Flight) -> Iterator[Event]:
 
 
 def _end(flight: Flight) -> Iterator[Event]:
-    """A log that ends while the vehicle is armed says nothing of how the flight ended."""
+    """A log that ends while the vehicle is armed says nothing of how the flight ended; nor does a station that records
+    on without it."""
     changes = flight.arm_changes
     is_armed = changes[-1].is_armed if changes else bool(flight.armed) and flight.armed[-1][1] > flight.end_s - 1.0
     if not is_armed:
+        if flight.silent_s:
+            text = f"the vehicle is heard no more; the station records for {flight.silent_s:.0f} s more"
+            yield Event(flight.end_s, "log", text, "the log")
         return
     aloft = ends_aloft(flight.run_at(flight.end_s))
     where = f" in the air, {aloft}" if aloft is not None else ""
