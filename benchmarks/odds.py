@@ -210,7 +210,8 @@ WAYS: dict[str, Callable[[Failure], list[frozenset[str]]]] = {
 
 
 def show(folder: Path, told: Told) -> None:
-    print(f"{folder.parent.name}/{folder.name}: {told.failures} failed missions that something repairs, {told.flagged} flagged")
+    where = f"{folder.parent.name}/{folder.name}"
+    print(f"{where}: {told.failures} failed missions that something repairs, {told.flagged} flagged")
     for name, pairs in (("hypotheses", told.hypotheses), ("leading", told.leading), ("promises", told.promises),
                         ("advised", told.advised)):  # fmt: skip
         if pairs:
