@@ -119,7 +119,7 @@ def _excused(
         return ""
     config = {**reference.config, **{name: usual for name, (_, usual) in met.items()}}
     need = need_of(objective.name, replace(reference, config=config), schema, model)
-    if need is None or limit(relative, need).met(value):
+    if need is None or limit(relative, replace(need, is_own=_is_driven(reference, run))).met(value):
         return ""
     far = ", ".join(
         f"{name} {figures(own)} {schema.variables[name].unit}".rstrip()

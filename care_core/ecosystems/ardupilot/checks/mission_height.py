@@ -19,6 +19,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import Span, during
 from care_core.ecosystems.vehicles import flies, way_of
 from care_core.logs.base import Wanted
+from care_core.numbers import Bools, Floats
 from care_core.run import shown
 
 READS: Wanted = {}
@@ -58,9 +59,8 @@ def _flew_above(flight: Flight) -> Iterator[Finding]:
         above = height > (math.inf if highest is None else highest + max(_ABOVE_M, _TIMES * highest))
         if highest is None or not above.any():
             continue  # nearly every flight: nothing else is looked at
-        by_itself = np.array([way_of(flight.mode_kind, int(mode)) == "mission" for mode in flight.modes_at(t)])
         held = (t >= mission.since_s) & (t < until_s) & during(flight.airborne, t)
-        if spans := lasting(t, above & by_itself & held, _LASTS_S):
+        if spans := lasting(t, above & _by_itself(flight, t) & held, _LASTS_S):
             start, end = spans[0][0], spans[-1][1]
             yield _finding(flight, start, end, float(np.max(height[(t >= start) & (t <= end)])), highest)
             return
@@ -82,12 +82,17 @@ def _sank(flight: Flight) -> Iterator[Finding]:
         if not len(high):
             continue
         low = held & (height < min(_BELOW * lowest, lowest - _BELOW_M)) & (t > high[0]) & (t < high[-1])
-        by_itself = np.array([way_of(flight.mode_kind, int(mode)) == "mission" for mode in flight.modes_at(t)])
-        if spans := [
-            span for span in lasting(t, low & by_itself, _SANK_S) if spent[(t >= span[0]) & (t <= span[1])].any()
-        ]:
+        if not low.any():
+            continue  # nearly every flight: nothing else is looked at
+        sank = lasting(t, low & _by_itself(flight, t), _SANK_S)
+        if spans := [span for span in sank if spent[during([span], t)].any()]:
             yield _sinking(spans, float(min(height[during(spans, t)])), lowest)
             return
+
+
+def _by_itself(flight: Flight, t: Floats) -> Bools:
+    """At which of these times it flew its mission."""
+    return np.array([way_of(flight.mode_kind, int(mode)) == "mission" for mode in flight.modes_at(t)])
 
 
 def _lowest_m(mission: HeldMission) -> float | None:
