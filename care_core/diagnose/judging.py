@@ -240,8 +240,8 @@ def query_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> Coun
 
 
 def facing_mission(query: CounterfactualQuery, judged: Judged, profile: Profile) -> CounterfactualQuery:
-    """The same for a vehicle that was refused: its mission is still before it, so the odds of a change are those of
-    every limit, also of what this run could not miss."""
+    """The same for a vehicle whose mission is still before it: the odds of a change are those of every limit, also of
+    what this run could not miss."""
     ahead = limits_ahead(profile.schema, query.model, judged.reference, judged.bounds)
     return replace(query, thresholds={**judged.bounds, **ahead})
 

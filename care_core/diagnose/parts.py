@@ -23,8 +23,11 @@ from care_core.ecosystems.findings import (
     every_finding,
 )
 from care_core.ecosystems.ranking import LIKELY
+from care_core.run import Run
 from care_core.text import log_time
 
+_REACHED = "waypoints_reached"
+"""The metric of the waypoints that a run came to, in profiles of vehicles."""
 OUTLASTED = "the flight outlasted its battery"
 """What explains a failsafe of the battery that is all that went wrong."""
 LATE_S = 5.0
@@ -40,6 +43,11 @@ _SET_APART = re.compile(r"critical\s*>=|failsafe critical|capacity", re.IGNORECA
 def was_refused(findings: Iterable[Finding]) -> bool:
     """Whether it never armed, by what was found or by what that led to."""
     return any(one.kind == "prearm" for one in every_finding(findings))
+
+
+def is_ahead(run: Run, findings: Iterable[Finding]) -> bool:
+    """Whether the whole mission is still before a vehicle: it was refused, or reached nothing of it."""
+    return was_refused(findings) or run.metrics.get(_REACHED) == 0.0
 
 
 def never_flew(findings: Iterable[Finding]) -> bool:

@@ -19,7 +19,7 @@ from care_core.diagnose.judging import Judged, check_wishes, facing_mission, que
 from care_core.diagnose.next_step import again, bench, was_upset
 from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.outside.change import check_first, leading_outside, shown_fix
-from care_core.diagnose.parts import was_refused
+from care_core.diagnose.parts import is_ahead
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Diagnosis, Fault, Fix, Hypothesis, ObjectiveResult, OutsideSuspect
 from care_core.diagnose.remarks import notes_of, reference_note
@@ -100,7 +100,7 @@ def diagnose(
     report("ranking the causes", 0.7)
     query = query_of(judged, profile, keep)
     blamed = blame(judged, profile, query, health, good)
-    if was_refused(health.findings):
+    if is_ahead(run, health.findings):
         query = facing_mission(query, judged, profile)
     failed = FailedRun(profile, choice, run, query, reference_note(judged), blamed.unranked, health.findings)
     unheard = _unheard(failed, broken, health)

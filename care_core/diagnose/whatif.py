@@ -13,7 +13,7 @@ from care_core.diagnose.blame import blame
 from care_core.diagnose.fixes import change_notes, prediction
 from care_core.diagnose.judging import Judged, facing_mission, query_of
 from care_core.diagnose.noisy_or import NoisyOr
-from care_core.diagnose.parts import was_refused
+from care_core.diagnose.parts import is_ahead
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import ObjectiveResult, Odds, Prediction
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
@@ -161,7 +161,7 @@ def question(judged: Judged, profile: Profile, choice: ProfileChoice, health: He
         raise UsageError("No mission was flown, so no outcome of one can be predicted.", hint=NO_MISSION_HINT)
     query = query_of(judged, profile)
     failure = blame(judged, profile, query, health).failure if judged.broken else None
-    if was_refused(health.findings):
+    if is_ahead(judged.run, health.findings):
         query = facing_mission(query, judged, profile)
     asked = Question(
         profile=choice,
