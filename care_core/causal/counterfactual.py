@@ -214,7 +214,8 @@ class CounterfactualQuery(Record, eq=False, dict=True):
                     ok = None  # what came after the failure, or of it, says nothing about this stage
                 passed += [] if ok is None else [ok]
                 runs[i] = seen, reached and ok is not False
-            ended += [stage.variable] if False in passed and stage.variable in graph.nodes else []
+            if False in passed and stage.variable in graph.nodes:
+                ended.append(stage.variable)
             p_ok *= self._stage_probability(outcome.objective, stage, passed, configs)
         return p_ok
 

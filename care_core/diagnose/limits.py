@@ -57,14 +57,14 @@ def limits_of(run: Run, schema: Schema, model: Model, reference: Reference, fixe
         if why := next(_doubts(objective, run, schema, model), ""):
             unknown[name] = Unavailable(why, f"give this mission's bound with --threshold {name}=VALUE")
         elif need := need_of(name, reference, schema, model):
-            needs[name] = replace(need, is_own=_is_driven(reference, run))
+            needs[name] = replace(need, is_own=_was_driven_as(reference, run))
             bounds[name] = limit(relative, needs[name])
             if why := _excused(objective, run, bounds[name], reference, schema, model):
                 unknown[name] = Unavailable(why, f"give this mission's bound with --threshold {name}=VALUE")
     return Limits(bounds, needs, unknown)
 
 
-def _is_driven(reference: Reference, run: Run) -> bool:
+def _was_driven_as(reference: Reference, run: Run) -> bool:
     """Whether a run was driven as the reference, as far as is known of its options."""
     known = [name for name in reference.config if name in run.config]
     return bool(known) and not deviating({name: run.config[name] for name in known}, reference.config)
@@ -119,7 +119,7 @@ def _excused(
         return ""
     config = {**reference.config, **{name: usual for name, (_, usual) in met.items()}}
     need = need_of(objective.name, replace(reference, config=config), schema, model)
-    if need is None or limit(relative, replace(need, is_own=_is_driven(reference, run))).met(value):
+    if need is None or limit(relative, replace(need, is_own=_was_driven_as(reference, run))).met(value):
         return ""
     far = ", ".join(
         f"{name} {figures(own)} {schema.variables[name].unit}".rstrip()

@@ -26,7 +26,8 @@ def test_what_repaired_the_run_is_advised(recorded: Path, log: str, changes: set
     fix = diagnosed(recorded, log).fix
     assert fix is not None
     assert {change.option.name for change in fix.changes} == changes
-    assert fix.odds is None or fix.odds > 0.35
+    least = 0.35 if changes == {"INS_GYRO_FILTER"} else 0.5  # of a value far beyond training little is promised
+    assert fix.odds is None or fix.odds > least
 
 
 def test_a_part_that_is_mended_first_does_not_hide_the_likelier_parameter(recorded: Path) -> None:

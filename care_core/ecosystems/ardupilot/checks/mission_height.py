@@ -60,7 +60,7 @@ def _flew_above(flight: Flight) -> Iterator[Finding]:
         if highest is None or not above.any():
             continue  # nearly every flight: nothing else is looked at
         held = (t >= mission.since_s) & (t < until_s) & during(flight.airborne, t)
-        if spans := lasting(t, above & _by_itself(flight, t) & held, _LASTS_S):
+        if spans := lasting(t, above & _in_mission(flight, t) & held, _LASTS_S):
             start, end = spans[0][0], spans[-1][1]
             yield _finding(flight, start, end, float(np.max(height[(t >= start) & (t <= end)])), highest)
             return
@@ -84,13 +84,13 @@ def _sank(flight: Flight) -> Iterator[Finding]:
         low = held & (height < min(_BELOW * lowest, lowest - _BELOW_M)) & (t > high[0]) & (t < high[-1])
         if not low.any():
             continue  # nearly every flight: nothing else is looked at
-        sank = lasting(t, low & _by_itself(flight, t), _SANK_S)
+        sank = lasting(t, low & _in_mission(flight, t), _SANK_S)
         if spans := [span for span in sank if spent[during([span], t)].any()]:
             yield _sinking(spans, float(min(height[during(spans, t)])), lowest)
             return
 
 
-def _by_itself(flight: Flight, t: Floats) -> Bools:
+def _in_mission(flight: Flight, t: Floats) -> Bools:
     """At which of these times it flew its mission."""
     return np.array([way_of(flight.mode_kind, int(mode)) == "mission" for mode in flight.modes_at(t)])
 

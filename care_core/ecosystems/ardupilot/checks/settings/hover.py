@@ -16,7 +16,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import Span, during
 from care_core.logs.base import Wanted
-from care_core.numbers import known_median, median
+from care_core.numbers import Floats, known_median, median
 
 READS: Wanted = {"CTUN": ("ThO", "Alt"), "RCOU": tuple(f"C{n}" for n in range(1, 9))}
 
@@ -152,12 +152,13 @@ def _swings(flight: Flight) -> Iterator[Finding]:
     vehicle holds its height itself."""
     assert flight.throttle is not None
     t, driven = flight.throttle
+    mean = smooth(t, driven, 3.0)
     raised = [name for name in _GAINS if _is_raised(flight, name)]
-    spans = [(start + _EDGE_S, end - _EDGE_S) for start, end in flight.flown] if raised else _by_itself(flight)
+    spans = [(start + _EDGE_S, end - _EDGE_S) for start, end in flight.flown] if raised else _by_itself(flight, t, mean)
     flying = during(spans, t)
     if flying.sum() < _FEWEST:
         return
-    swing, limit = float(median(np.abs(driven - smooth(t, driven, 3.0))[flying])), _SWINGS if raised else _SWINGS_ALONE
+    swing, limit = float(median(np.abs(driven - mean)[flying])), _SWINGS if raised else _SWINGS_ALONE
     if swing > limit:
         told = [f"{name}={flight.setting(name):g}" for name in raised]
         yield Finding(
@@ -175,12 +176,14 @@ def _swings(flight: Flight) -> Iterator[Finding]:
         )
 
 
-def _by_itself(flight: Flight) -> list[Span]:
-    """Where it lifts, low or high, in modes in which the throttle is not the pilot's."""
-    assert flight.throttle is not None
-    t, driven = flight.throttle
+def _by_itself(flight: Flight, t: Floats, mean: Floats) -> list[Span]:
+    """Where it lifts, low or high, in modes in which the throttle is not the pilot's.
+
+    Args:
+        mean: its throttle over three seconds, at the times t.
+    """
     lost_s = flight.lost_control_s if flight.lost_control_s is not None else flight.end_s
-    lifts = (smooth(t, driven, 3.0) > _LIFTS) & during(flight.armed, t) & ~np.isin(flight.modes_at(t), BY_STICK)
+    lifts = (mean > _LIFTS) & during(flight.armed, t) & ~np.isin(flight.modes_at(t), BY_STICK)
     return lasting(t, lifts & (t < lost_s), _SWINGS_S)
 
 
