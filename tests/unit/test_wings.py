@@ -105,6 +105,33 @@ def test_a_throttle_that_is_taken_back_is_no_lost_motor() -> None:
     assert found(flown, "motor") is None
 
 
+def runs_along_the_ground(speed_ms: float) -> MadePlane:
+    """A take-off run at full throttle from 10 s on that ends at one speed and leads to no flight."""
+    flown = MadePlane()
+    t, table = flown.t, flown.table
+    speed = np.interp(t, [10.0, 20.0], [0.0, speed_ms])
+    table["CTUN"] |= {"ThO": np.where(t > 10.0, 100.0, 0.0), "As": speed}
+    table["BAT"]["Curr"] = np.where(t > 10.0, 40.0, 0.0)
+    table["GPS"] |= {"Spd": speed, "Alt": np.full(len(t), 400.0)}
+    table["POS"]["RelHomeAlt"] = np.zeros(len(t))
+    table["ATT"] |= {"Roll": np.zeros(len(t)), "DesRoll": np.zeros(len(t)), "Pitch": np.zeros(len(t))}
+    for number in ("", "#2"):
+        table[f"BARO{number}"]["Alt"] = flown.noise(0.1)
+    return flown
+
+
+def test_full_throttle_that_does_not_bring_it_off_the_ground() -> None:
+    finding = found(runs_along_the_ground(4.2), "motor")
+    assert finding is not None
+    assert finding.title == "full throttle does not bring it off the ground"
+    assert "lead to 4.2 m/s, where AIRSPEED_MIN is 12" in finding.evidence
+    assert finding.onset_s == pytest.approx(10.0, abs=0.3)
+
+
+def test_a_run_that_is_fast_enough_to_fly_has_a_motor_that_pulls() -> None:
+    assert found(runs_along_the_ground(11.0), "motor") is None
+
+
 @pytest.mark.parametrize("rate_hz", RATES_HZ)
 def test_an_airspeed_that_stands_still(rate_hz: float) -> None:
     flown = MadePlane(rate_hz)

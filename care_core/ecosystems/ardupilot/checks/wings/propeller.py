@@ -1,4 +1,5 @@
-"""A plane's motor that draws less for its throttle than before: the motor, its controller or the propeller failed.
+"""A plane's motor that draws less for its throttle than before, or that does not bring it off the ground: the motor, its
+controller or the propeller failed.
 
 The current of a propeller goes with the square of its throttle, near enough: over 300 simulated flights with a sound
 motor it stays within 0.93 and 1.08 times what it was, at any throttle above 30 %.
@@ -32,12 +33,51 @@ _ENOUGH_A = LIMITS.add("current that tells", 1.0, "A", "a choice: sensors have a
 _FAILED_P = LIMITS.add("probability of the motor", 0.9, "", "none of 300 sound flights")
 _UNDER_WAY = LIMITS.add("speed, as a share of the usual, at which it tells", 0.6, "", "a choice: at rest it takes more")
 _BEFORE = 10
+_FULL = LIMITS.add("throttle of a take-off run", 0.95, "", "a choice: a plane that can fly takes off with it")
+_RUNS_S = LIMITS.add("time of full throttle on the ground", 10.0, "s", "simulated planes lift off within 3 to 6 s")
+_SLOW = LIMITS.add("speed of such a run, as a share of AIRSPEED_MIN", 0.8, "", "a choice: near it, a plane lifts off")
+_GAINS_MS = LIMITS.add("speed that it still gains in so long", 1.0, "m/s", "a choice: more, and the run goes on")
+_LEAST_MS = 9.0
+"""AIRSPEED_MIN as shipped (ArduPlane, Parameters.cpp)."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """A drop of the current that one throttle takes."""
+    """A drop of the current that one throttle takes; full throttle on the ground that leads to no flight."""
+    if flight.kind == "plane":
+        yield from _draws_less(flight)
+        yield from _does_not_pull(flight)
+
+
+def _does_not_pull(flight: Flight) -> Iterator[Finding]:
+    driven, moved = flight.one("CTUN", "ThO"), flight.one("GPS", "Spd")
+    if flight.airborne or driven is None or moved is None:
+        return
+    least = flight.setting("AIRSPEED_MIN", "ARSPD_FBW_MIN") or _LEAST_MS
+    for start, end in lasting(driven.t, (driven["ThO"] > _FULL) & during(flight.armed, driven.t), _RUNS_S):
+        speed = moved["Spd"][(moved.t >= start) & (moved.t <= end)]
+        last = moved["Spd"][(moved.t >= end - _RUNS_S) & (moved.t <= end)]
+        if not len(last) or float(np.max(speed)) > _SLOW * least or float(last[-1] - last[0]) > _GAINS_MS:
+            continue
+        yield Finding(
+            kind="motor",
+            title="full throttle does not bring it off the ground",
+            onset_s=start,
+            end_s=end,
+            severity="critical",
+            evidence=(
+                f"{end - start:.0f} s of full throttle lead to {float(np.max(speed)):.1f} m/s, where AIRSPEED_MIN is "
+                f"{least:g}: the motor, its controller or the propeller does not pull, or something holds it"
+            ),
+            source="CTUN.ThO, GPS.Spd",
+            probability=_FAILED_P,
+            mission_lost=1.0,
+        )
+        return
+
+
+def _draws_less(flight: Flight) -> Iterator[Finding]:
     battery, driven, moved = flight.one("BAT", "Curr"), flight.one("CTUN", "ThO"), flight.one("GPS", "Spd")
-    if flight.kind != "plane" or battery is None or driven is None or moved is None:
+    if battery is None or driven is None or moved is None:
         return
     throttle = np.interp(battery.t, driven.t, driven["ThO"])
     speed = np.interp(battery.t, moved.t, moved["Spd"])
@@ -70,4 +110,10 @@ def find(flight: Flight) -> Iterator[Finding]:
     )
 
 
-CHECK = Check("propeller", "a plane's motor that draws less for its throttle than before", READS, LIMITS, find)
+CHECK = Check(
+    "propeller",
+    "a plane's motor that draws less than before, or that does not bring it off the ground",
+    READS,
+    LIMITS,
+    find,
+)
