@@ -260,8 +260,11 @@ def _(report: Report) -> bool:
 
 @_named("a change beside a part that explains more")
 def _(report: Report) -> bool:
-    first = next((one for one in report.hypotheses if one.name), None)
-    return report.fix is not None and first is not None and first.what in ("hardware", "world")
+    parameters = sum(one.probability for one in report.hypotheses if one.what == "parameter" and one.name)
+    parts = max(
+        (one.probability for one in report.hypotheses if one.what in ("hardware", "world") and one.name), default=0.0
+    )
+    return report.fix is not None and parts > parameters + _ROUNDED
 
 
 @_named("a change beside a part that surely failed")
@@ -318,8 +321,8 @@ def _(report: Report) -> bool:
 def _(report: Report) -> bool:
     upset = any(kind in _UPSET and severity == "critical" for kind, severity, _ in _titles(report))
     as_it_was = (text.removesuffix("then run again") for text in _next(report))  # a simulation, once it is put right
-    if any(one.text.startswith("SIM ") for one in report.account):  # so is one once the change is made
-        as_it_was = (text.removeprefix("make the change, run again") for text in as_it_was)
+    if any(one.text.startswith("SIM ") or "PX4_SITL" in one.text for one in report.account):  # so is one once changed
+        as_it_was = (text for text in as_it_was if not text.startswith(("make the change, run again", "put all ")))
     return upset and any("run again" in text or "run the same" in text for text in as_it_was)
 
 

@@ -123,7 +123,7 @@ def runs_along_the_ground(speed_ms: float) -> MadePlane:
 def test_full_throttle_that_does_not_bring_it_off_the_ground() -> None:
     finding = found(runs_along_the_ground(4.2), "motor")
     assert finding is not None
-    assert finding.title == "full throttle does not bring it off the ground"
+    assert finding.title == "it stays on the ground at full throttle"
     assert "lead to 4.2 m/s, where AIRSPEED_MIN is 12" in finding.evidence
     assert finding.onset_s == pytest.approx(10.0, abs=0.3)
 
