@@ -258,12 +258,16 @@ def unread_options(schema: Schema, run: Run) -> frozenset[str]:
     )
 
 
+_FAILSAFE = "failsafe acted at"
+"""How a shortfall tells of a failsafe: where no other is told, all of the mission was flown."""
+
+
 def _past_their_limits(
     run: Run, so_far: Mapping[str, Value], schema: Schema, bounds: Mapping[str, Threshold], needs: Mapping[str, Need]
 ) -> dict[str, float]:
-    """Objectives of a mission whose end the log does not hold that are broken already, however much the reference
-    configuration needs: those only grow."""
-    if run.mission.ended:
+    """Objectives that are broken already, however much the reference configuration needs, for they only grow: of a
+    mission whose end the log does not hold, and of one that was flown to its end and that a failsafe came into."""
+    if run.mission.ended and not all(_FAILSAFE in clause for clause in run.shortfall or ("",)):
         return {}
     past: dict[str, float] = {}
     for objective in schema.objectives:

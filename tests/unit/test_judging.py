@@ -92,6 +92,25 @@ def test_a_mission_that_was_not_accomplished_has_no_time(success: Value, why: st
         assert value.reason == f"not judged: {why}"
 
 
+@pytest.mark.parametrize(
+    ("shortfall", "status"),
+    [
+        (("the battery failsafe acted at 124.1 s",), "fault"),
+        (("2 of 5 mission items were reached", "the battery failsafe acted at 124.1 s"), "not_evaluated"),
+        ((), "not_evaluated"),
+    ],
+)
+@pytest.mark.parametrize("grows", [True, False])
+def test_a_failsafe_that_came_into_a_mission_excuses_no_time_past_its_limit(
+    shortfall: tuple[str, ...], status: str, grows: bool
+) -> None:
+    schema = with_variable(SCHEMA, replace(TIME, grows=grows))
+    run = replace(planted_run(), objectives={"success": 0.0, "time": 1e4, "energy": 1.0}, shortfall=shortfall)
+    assert judge(run, schema, MODEL).results[1].status == (status if grows else "not_evaluated")
+    short = replace(run, objectives={**run.objectives, "time": 1.0})
+    assert judge(short, schema, MODEL).results[1].status == "not_evaluated"
+
+
 def test_a_log_that_ends_early_evaluates_nothing() -> None:
     run = planted_run()
     judged = judge(replace(run, mission=replace(run.mission, ended=False)), SCHEMA, MODEL)

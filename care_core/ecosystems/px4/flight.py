@@ -21,6 +21,7 @@ from care_core.ecosystems.px4 import sources
 from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED, Lean, lean_of
 from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
 from care_core.ecosystems.px4.calibration import is_calibration, usual
+from care_core.ecosystems.px4.preflight import read_by
 from care_core.ecosystems.spans import Span, within
 from care_core.ecosystems.vehicles import is_simulated
 from care_core.ecosystems.vehicles.way import AIRBORNE_M
@@ -147,11 +148,14 @@ class Px4Flight(RunModel):
 
     @property
     def refusals(self) -> tuple[tuple[float, str], ...]:
-        """The different reasons for which it would not arm, as of when each was given last; that it will not, only
-        where it gives none."""
+        """The different reasons for which it would not arm, as of when each was given last, and those last that read a
+        parameter which is off its default; that it will not, only where it gives none."""
         last = {text: t for t, text in self.complaints}
         reasons = {text: t for text, t in last.items() if not is_bare_denial(text)} or last
-        return tuple(sorted((t, text) for text, t in reasons.items()))
+        return tuple(sorted(((t, text) for text, t in reasons.items()), key=lambda one: (self._is_set_so(one[1]), one)))
+
+    def _is_set_so(self, complaint: str) -> bool:
+        return any(self.off_default(name) is not None for name in read_by(reason_of(complaint)))
 
     @cached_property
     def kills(self) -> tuple[float, ...]:

@@ -21,8 +21,8 @@ _SURE_P = LIMITS.add("probability of what the vehicle says", 0.95, "", "the firm
 _UNSAID_P = LIMITS.add("probability of a parameter where it says nothing", 0.3, "", "a choice: a part is as likely")
 _KEPT_P = LIMITS.add("probability that no mission is flown so", 1.0, "", "it does not arm")
 
-_PLANNED_BY = frozenset(("GF_ACTION", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST", "MIS_DIST_1WP"))
-"""What missions are planned by: a mission beyond it is refused at its default, too."""
+_PLANNED_BY = frozenset(("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST", "MIS_DIST_1WP"))
+"""What missions are planned by: a mission beyond it is refused at its default, too; at 0 it refuses none."""
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
@@ -34,7 +34,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     others = "".join(f"{text}; " for text in reasons[-3:-1])
     asked = {name: _value_to_set(one) for name, one in off.items()}
     values = "".join(f"; {_way_back_of(one, asked[name])}" for name, one in off.items())
-    named = tuple(dict.fromkeys((*off, *(n for reason in reasons for n in read_by(reason) if n in _PLANNED_BY))))
+    named = tuple(off) or tuple(dict.fromkeys(n for reason in reasons for n in _planned_by(flight, reason)))
     is_unsaid = all(is_bare_denial(reason) for reason in reasons)
     yield Finding(
         kind="prearm",
@@ -50,6 +50,11 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         probability=_UNSAID_P if is_unsaid else _SURE_P,
         mission_lost=_KEPT_P,
     )
+
+
+def _planned_by(flight: Px4Flight, reason: str) -> Iterator[str]:
+    """The limits at their defaults that a reason speaks of."""
+    return (name for name in read_by(reason) if name in _PLANNED_BY and flight.parameter(name) != 0)
 
 
 def _value_to_set(one: Setting) -> float | None:
