@@ -162,3 +162,31 @@ def test_a_compass_that_is_left_out_is_named_where_none_is_found() -> None:
     said = "Found 0 compass (required: 1)"
     assert refused(said, calibrated(CAL_MAG0_PRIO=-1.0)).parameters == ("CAL_MAG0_PRIO",)
     assert refused(said, calibrated(CAL_MAG0_PRIO=100.0)).parameters == ()
+
+
+def fence(**metres: float) -> dict[str, tuple[Setting, ...]]:
+    values = {"GF_ACTION": 2.0, "GF_MAX_HOR_DIST": 0.0, "GF_MAX_VER_DIST": 0.0}
+    return {name: (Setting(name, metres.get(name, value), "ulog", value),) for name, value in values.items()}
+
+
+def test_a_fence_that_a_mission_crosses_is_named_and_nothing_of_it_that_is_as_shipped() -> None:
+    assert refused("Geofence violation", fence(GF_MAX_HOR_DIST=77.4)).parameters == ("GF_MAX_HOR_DIST",)
+
+
+def test_a_fence_that_the_airframe_brings_may_refuse_a_mission_too() -> None:
+    shipped = fence() | {"GF_MAX_VER_DIST": (Setting("GF_MAX_VER_DIST", 50.0, "ulog", 50.0),)}
+    assert refused("Geofence violation", shipped).parameters == ("GF_MAX_VER_DIST",)
+
+
+def test_what_reads_a_parameter_that_is_off_is_the_reason_that_is_told() -> None:
+    said = words(
+        (4.0, "critical", "Geofence violation for waypoint 3"),
+        (5.0, "critical", "Preflight Fail: GPS Vertical Pos Drift too high"),
+        (6.0, "critical", "Arming denied: Resolve system health failures first"),
+    )
+    tables = {STATUS: states(arming_state=[(0, 1)], nav_state=[(0, 4)]), MESSAGES: said}
+    for changed, told in (
+        ({"GF_MAX_HOR_DIST": 77.4}, "Geofence violation for waypoint 3"),
+        ({}, "Preflight Fail: GPS"),
+    ):
+        assert Px4Flight(MadeLog(tables, parameters=fence(**changed))).refusals[-1][1].startswith(told)
