@@ -51,7 +51,7 @@ from care_core.ecosystems.findings import (
     SuspectKind,
     every_finding,
 )
-from care_core.ecosystems.ranking import may_refuse
+from care_core.ecosystems.ranking import LIKELY, may_refuse
 from care_core.numbers import Floats
 from care_core.profile.schema import Schema
 from care_core.records import replace
@@ -123,7 +123,11 @@ def failure_of(
     options.update({one.option: REFUSING.value for group in found.values() for one in group if one.option in refused})
     causes: dict[Key, float] = {("parameter", name): q for name, q in {**outside, **options}.items()}
     return NoisyOr(
-        {CHANCE: chance, UNKNOWN: _either(UNMODELLED.value, UNSAID.value * untold), **with_findings(causes, findings)}
+        {
+            CHANCE: chance,
+            UNKNOWN: _either(UNMODELLED.value, UNSAID.value * untold),
+            **with_findings(causes, findings, outlasts=any(result.variable.grows for result in broken)),
+        }
     )
 
 
@@ -249,8 +253,14 @@ def _either(*shares: float) -> float:
     return 1.0 - float(np.prod([1.0 - share for share in shares]))
 
 
-def with_findings(causes: Mapping[Key, float], findings: Iterable[Finding]) -> dict[Key, float]:
-    """The causes with what the log shows, in the order told; what came after the impact explains nothing."""
+def with_findings(
+    causes: Mapping[Key, float], findings: Iterable[Finding], *, outlasts: bool = False
+) -> dict[Key, float]:
+    """The causes with what the log shows, in the order told; what came after the impact explains nothing.
+
+    Args:
+        outlasts: the run took more than its mission may take: a pack that gives out by no other sign is late, too.
+    """
     found = dict(causes)
     seen = [finding for finding in _acting(tuple(findings)) if finding.severity != "info"]
     by_setting = [finding for finding in seen if set_wrong(finding)]
@@ -261,9 +271,9 @@ def with_findings(causes: Mapping[Key, float], findings: Iterable[Finding]) -> d
         if _is_the_reason_itself(finding, causes):
             shares["world", finding.title] = REFUSED_ITSELF.value
         if finding.suspect in _WHAT:
-            shares[_WHAT[finding.suspect], finding.title] = whole * (
-                LATE.value if is_late(finding, by_setting) else 1.0
-            )
+            gave_out = outlasts and finding.kind == "battery" and finding.probability < LIKELY
+            late = gave_out or is_late(finding, by_setting)
+            shares[_WHAT[finding.suspect], finding.title] = whole * (LATE.value if late else 1.0)
         found |= {key: max(found.get(key, 0.0), share) for key, share in shares.items()}
     return found
 
