@@ -1,5 +1,5 @@
-"""A plane's motor that draws less for its throttle than before, or that leaves it on the ground: the motor, its controller
-or the propeller failed.
+"""A plane's motor that draws less for its throttle than before, or that leaves it on the ground: the motor, its
+controller or the propeller failed.
 
 The current of a propeller goes with the square of its throttle, near enough: over 300 simulated flights with a sound
 motor it stays within 0.93 and 1.08 times what it was, at any throttle above 30 %.
