@@ -97,6 +97,29 @@ def test_a_motor_that_draws_less_for_its_throttle(rate_hz: float) -> None:
     assert abs(finding.onset_s - 60.0) < 4.0
 
 
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_a_motor_that_dies_early_in_a_flight_that_glides_on(rate_hz: float) -> None:
+    flown = MadePlane(rate_hz)
+    dead = flown.after(40.0)
+    flown.table["BAT"]["Curr"][dead] = 0.0
+    flown.table["CTUN"]["ThO"][dead] = 100.0
+    flown.table["GPS"]["Spd"][dead] = 9.0
+    finding = found(flown, "motor")
+    assert finding is not None
+    assert finding.title == "the motor lost thrust"
+    assert abs(finding.onset_s - 40.0) < 4.0
+
+
+def test_a_plane_that_lies_on_the_ground_has_no_frozen_attitude() -> None:
+    flown = MadePlane()
+    lies = flown.after(DOWN_S + 2.0, float(flown.t[-1]))
+    for name in ("Roll", "Pitch", "Yaw"):
+        flown.table["ATT"][name] = np.array(flown.table["ATT"].get(name, np.zeros(len(flown.t))))
+        flown.table["ATT"][name][lies] = 0.1
+    flown.table["GPS"]["Spd"][lies] = 1.3
+    assert not [one for one in every_finding(flown.find()) if "frozen" in one.title]
+
+
 def test_a_throttle_that_is_taken_back_is_no_lost_motor() -> None:
     flown = MadePlane()
     low = flown.after(60.0)

@@ -171,7 +171,8 @@ class Flight(Airborne):
     @cached_property
     def frozen(self) -> tuple[Frozen, ...]:
         """Stretches in which a source only repeats itself while the vehicle moves."""
-        return tuple(sources.frozen(self, (*self.flown, *self._lifted) if self.is_copter else self.watched))
+        in_air = (*self.flown, *self._lifted) if self.is_copter else self.flown if self.is_winged else ()
+        return tuple(sources.frozen(self, in_air if self.is_copter else in_air or self.watched))
 
     @property
     def _lifted(self) -> Iterator[Span]:

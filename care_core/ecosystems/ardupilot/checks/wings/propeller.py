@@ -17,7 +17,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during
 from care_core.logs.base import Wanted
-from care_core.numbers import median
+from care_core.numbers import Floats, median, quantile
 
 READS: Wanted = {
     "BAT": ("Curr",),
@@ -32,7 +32,8 @@ _LASTS_S = LIMITS.add("shortest time of a lesser current", 5.0, "s", "a choice: 
 _ENOUGH_A = LIMITS.add("current that tells", 1.0, "A", "a choice: sensors have an offset")
 _FAILED_P = LIMITS.add("probability of the motor", 0.9, "", "none of 300 sound flights")
 _UNDER_WAY = LIMITS.add("speed, as a share of the usual, at which it tells", 0.6, "", "a choice: at rest it takes more")
-_BEFORE = 10
+_BEFORE, _DRAWS = 10, 0.9
+"""Records of a flight before it tells, and the quantile of its current that has to tell."""
 _FULL = LIMITS.add("throttle of a take-off run", 0.95, "", "a choice: a plane that can fly takes off with it")
 _RUNS_S = LIMITS.add("time of full throttle on the ground", 10.0, "s", "simulated planes lift off within 3 to 6 s")
 _SLOW = LIMITS.add("speed of such a run, as a share of AIRSPEED_MIN", 0.8, "", "a choice: near it, a plane lifts off")
@@ -80,14 +81,15 @@ def _draws_less(flight: Flight) -> Iterator[Finding]:
     if battery is None or driven is None or moved is None:
         return
     throttle = np.interp(battery.t, driven.t, driven["ThO"])
-    speed = np.interp(battery.t, moved.t, moved["Spd"])
     pulls = (throttle > _PULLS) & during(flight.flown, battery.t)
-    pulls &= speed > _UNDER_WAY * float(median(speed[pulls])) if pulls.any() else False
     t, current, throttle = battery.t[pulls], battery["Curr"][pulls], throttle[pulls]
-    if len(t) < 2 * _BEFORE or float(median(current)) < _ENOUGH_A:
+    speed = np.interp(t, moved.t, moved["Spd"])
+    under_way = speed > _UNDER_WAY * float(median(speed)) if len(t) else pulls[:0]
+    if under_way.sum() < 2 * _BEFORE or quantile(current[under_way], _DRAWS) < _ENOUGH_A:
         return
-    taken = steady(t, current / throttle**2, 4.0)
-    usual = np.maximum.accumulate(steady(t, taken, 8.0))
+    ratio = current / throttle**2
+    before = steady(t[under_way], steady(t[under_way], ratio[under_way], 4.0), 8.0)
+    taken, usual = steady(t, ratio, 4.0), _so_far(t, t[under_way], np.maximum.accumulate(before))
     spans = lasting(t, taken < _DROP * usual, _LASTS_S, gap_s=3.0)
     if not spans:
         return
@@ -108,6 +110,12 @@ def _draws_less(flight: Flight) -> Iterator[Finding]:
         probability=_FAILED_P,
         mission_lost=0.7,
     )
+
+
+def _so_far(t: Floats, told_t: Floats, told: Floats) -> Floats:
+    """What was told last at each of these times, 0 before the first."""
+    last = np.searchsorted(told_t, t, side="right") - 1
+    return np.where(last < 0, 0.0, told[np.maximum(last, 0)])
 
 
 CHECK = Check(
