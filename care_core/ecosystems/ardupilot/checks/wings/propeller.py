@@ -88,8 +88,8 @@ def _draws_less(flight: Flight) -> Iterator[Finding]:
     if under_way.sum() < 2 * _BEFORE or quantile(current[under_way], _DRAWS) < _ENOUGH_A:
         return
     ratio = current / throttle**2
-    before = steady(t[under_way], steady(t[under_way], ratio[under_way], 4.0), 8.0)
-    taken, usual = steady(t, ratio, 4.0), _so_far(t, t[under_way], np.maximum.accumulate(before))
+    sound = steady(t[under_way], steady(t[under_way], ratio[under_way], 4.0), 8.0)
+    taken, usual = steady(t, ratio, 4.0), _so_far(t, t[under_way], np.maximum.accumulate(sound))
     spans = lasting(t, taken < _DROP * usual, _LASTS_S, gap_s=3.0)
     if not spans:
         return
