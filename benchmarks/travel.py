@@ -54,8 +54,8 @@ APART = {
         "path_length", "legs", "hold_time", "commanded_speed", "takeoff_height", "return_distance", "hover_power",
     ),
     "ardurover": ("path_length", "legs", "hold_time", "commanded_speed", "sharp_turns", "steering_kind"),
-    "arduplane": ("path_length", "legs", "hold_time", "loiter_turns", "rises", "sharpest_corner", "level_power"),
-    "quadplane": ("path_length", "legs", "hold_time", "loiter_turns", "rises", "sharpest_corner", "returns"),
+    "arduplane": ("way_out", "legs", "hold_time", "loiter_turns", "rises", "sharpest_corner", "level_power"),
+    "quadplane": ("way_out", "legs", "hold_time", "loiter_turns", "rises", "sharpest_corner", "returns"),
     "ardusub": ("path_length", "legs", "hold_time", "climb", "descent", "corner_turn"),
     "px4": ("path_length", "legs", "hold_time", "commanded_speed", "takeoff_height", "return_distance", "hover_power"),
 }  # fmt: skip
@@ -152,7 +152,8 @@ def _asked(
         plain=np.full(n, np.nan),
     )
     reference = {v.name: v.default for v in schema.options if v.default is not None}
-    configs = [{str(k): float(v) for k, v in row.items()} for row in filled.to_dict("records")]
+    named = filled[[*schema.variables]]  # a table may tell the day as well
+    configs = [{str(k): float(v) for k, v in row.items()} for row in named.to_dict("records")]
     found.plain[:] = peer.probability(configs)
     for i, config in enumerate(configs):
         there = {**config, **reference}

@@ -2,8 +2,9 @@
 
     python -m benchmarks.tools.train_profiles [--shared DIR] [--only NAME]... [--tables DIR]
 
-The platforms with recorded missions are ingested from the logs themselves, the others from published tables; the
-lander's arm is simulated anew by its campaign.
+Where the logs of a platform's missions are at hand they are ingested themselves; of planes and PX4 the table that was
+made from them lies in `benchmarks/tables`. The others are published tables; the lander's arm is simulated anew by its
+campaign.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ from care_core.tables.ingest import ingest, journal_of
 from care_core.tables.rows import write_table
 
 RESAMPLES = 50
+TABLES = Path(__file__).parents[1] / "tables"
+"""Tables of runs whose logs are not at hand, made by `care ingest` and rounded to six digits."""
 
 
 class Source(Record):
@@ -40,6 +43,8 @@ class Source(Record):
     origin: str
     hardware: str = ""
     """A table with the columns `tag` and `hardware`: logs in which hardware failed teach nothing about parameters."""
+    table: str = ""
+    """A table of `TABLES`, in place of `paths`."""
     simulation: str = ""
     """A module that writes a campaign of simulated missions and drives them, in place of `paths`."""
 
@@ -61,17 +66,20 @@ SOURCES = {
         hardware="data/rover/table.csv",
     ),
     "arduplane": Source(
-        ("data/plane/table.tar.xz",),
+        (),
         "Missions of the ArduPlane V4.5.4 firmware in its software-in-the-loop simulator, recorded by this project "
-        "under random configurations and winds: 442 flights of 57 settings (mission with waits, turns of own radii, "
-        "commanded airspeeds and climbs, plane, site), of each mission the reference twice, and of the rest two thirds "
-        "with one to three options off; DataFlash logs, read by `care ingest`.",
+        "under random configurations and winds: 467 flights of 61 settings (mission with waits, turns of own radii, "
+        "commanded airspeeds, climbs and returns, plane, site), of each mission the reference twice, and of the rest "
+        "two thirds with one to three options off; DataFlash logs, read by `care ingest`.",
+        table="arduplane.csv",
     ),
     "quadplane": Source(
-        ("data/quadplane/table.tar.xz",),
+        (),
         "Missions of the ArduPlane V4.5.4 firmware with a QuadPlane in its software-in-the-loop simulator, recorded by "
-        "this project under random configurations, in half of them one to three options off, and winds: 354 flights of "
-        "33 settings (mission, QuadPlane, site) in which no hardware failed; DataFlash logs, read by `care ingest`.",
+        "this project under random configurations and winds: 350 flights of 45 settings (mission with waits, turns of "
+        "own radii, commanded airspeeds, climbs and returns, QuadPlane, site), of each mission the reference twice, "
+        "and of the rest two thirds with one to three options off; DataFlash logs, read by `care ingest`.",
+        table="quadplane.csv",
     ),
     "ardusub": Source(
         ("data/sub/table.tar.xz",),
@@ -139,7 +147,9 @@ SOURCES = {
 
 
 def runs_table(source: Source, schema: Schema, shared: Path, folder: Path) -> Path:
-    """The table of runs: the published one, or one made from the logs or by a campaign."""
+    """The table of runs: the published or kept one, or one made from the logs or by a campaign."""
+    if source.table:
+        return TABLES / source.table
     if source.simulation:
         start, campaign = folder / schema.name, folder / schema.name / "campaign.yaml"
         for words in ((source.simulation, "--start", start), ("care_tui", "collect", campaign)):

@@ -43,6 +43,8 @@ _AS_SENT: Mapping[str, tuple[str, _Scaled]] = {
     "POWR": ("POWER_STATUS", {"Vcc": ("Vcc", 1e-3)}),
     "XKF4": ("EKF_STATUS_REPORT", {"SV": ("velocity_variance", 1), "SP": ("pos_horiz_variance", 1),
                                    "SH": ("pos_vert_variance", 1), "SM": ("compass_variance", 1)}),
+    "THR": ("VFR_HUD", {"ThrOut": ("throttle", 1), "Speed": ("groundspeed", 1)}),
+    "STER": ("ATTITUDE", {"TurnRate": ("yawspeed", 180 / np.pi)}),
     "RATE": ("ATTITUDE", {"R": ("rollspeed", 180 / np.pi), "P": ("pitchspeed", 180 / np.pi),
                           "Y": ("yawspeed", 180 / np.pi)}),
 }  # fmt: skip
@@ -257,23 +259,24 @@ def _messages(log: _Telemetry) -> Table | None:
 
 
 def _texts(log: _Telemetry) -> Iterator[Sample]:
-    """The texts of STATUSTEXT; a long one comes in pieces of the same number."""
+    """The texts of STATUSTEXT, without the tab at the end by which PX4 marks those that it sends as events, too; a long
+    one comes in pieces of the same number."""
     table = log.heard("STATUSTEXT", "text", "id", "chunk_seq")
     if table is None:
         return
     began: tuple[float, int, str] | None = None
     for t, text, number, piece in zip(table.t, table["text"], table["id"], table["chunk_seq"], strict=True):
         if began is not None and (number == 0 or piece == 0 or number != began[1]):
-            yield began[0], (began[2],)
+            yield began[0], (began[2].strip(),)
             began = None
         if number == 0:
-            yield float(t), (str(text),)
+            yield float(t), (str(text).strip(),)
         elif began is None:
             began = (float(t), int(number), str(text))
         else:
             began = (*began[:2], began[2] + str(text))
     if began is not None:
-        yield began[0], (began[2],)
+        yield began[0], (began[2].strip(),)
 
 
 def _items(log: _Telemetry) -> Table | None:

@@ -10,7 +10,7 @@ import pytest
 
 from care_core.ecosystems import not_numbers
 from care_core.run import Setting
-from tests.flights import END_S, FAILS_S, RATES, Made, first
+from tests.flights import DOWN_S, END_S, FAILS_S, RATES, Made, first
 
 
 @pytest.mark.parametrize("rate_hz", RATES)
@@ -49,6 +49,15 @@ def test_a_compass_that_is_not_used_is_nobodys_business() -> None:
     made.table["MAG#2"]["MagX"][made.after(FAILS_S)] += 260
     made.settings["COMPASS_USE2"] = 0
     assert made.find() == ()
+
+
+def test_what_stays_when_the_motors_stop_is_the_place() -> None:
+    made = Made()
+    for number in ("", "#2"):
+        field = made.table[f"MAG{number}"]["MagZ"]
+        field += 700 * made.table["CTUN"]["ThO"]
+        field[made.after(DOWN_S)] += 250
+    assert "the motors' currents disturb the compass" not in [one.title for one in made.find()]
 
 
 def test_motors_that_disturb_a_compass() -> None:

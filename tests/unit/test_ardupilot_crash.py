@@ -267,3 +267,11 @@ def test_what_stood_again_and_was_told_to_lean_tipped_over(asked_deg: float, tit
     made.table["IMU"]["AccZ"][made.after(DOWN_S + 4.0, DOWN_S + 4.2)] = -45.0
     found = every_finding(made.find())
     assert [one.title for one in found if one.kind in ("crash", "takeoff")] == [title]
+
+
+@pytest.mark.parametrize(("speed", "is_caught"), [(0.2, True), (8.0, False)])
+def test_what_goes_on_its_way_lies_on_nothing(speed: float, is_caught: bool) -> None:
+    made = Made()
+    made.table["ATT"]["Roll"][made.after(FAILS_S)] = 100.0
+    made.table["GPS"]["Spd"][made.after(FAILS_S)] = speed
+    assert made.flight().is_caught == is_caught

@@ -16,6 +16,7 @@ from care_core.ecosystems.ardupilot.measures.requested import (
     requested_mission,
 )
 from care_core.ecosystems.measures import Mission
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.ecosystems.vehicles.way import RequestedMission
 from care_core.logs.base import Table
 from care_core.run import Unavailable
@@ -43,6 +44,7 @@ def mission(*items: tuple[float, ...], bat: Table | None = None) -> Mission:
     }
     if bat is not None:
         tables["BAT"] = bat
+        tables["ARM"] = table_of(ArmState=[1.0, 1.0], Forced=[0.0, 0.0])
     return Mission(Flight(TablesLog(tables, 100.0)), tables, 0.0, 100.0, True, {})
 
 
@@ -116,3 +118,6 @@ def test_power_and_resistance_are_those_in_the_air() -> None:
     assert hover_power(flown, {}) == pytest.approx(11.5 * 31)
     assert internal_resistance(flown, {}) == pytest.approx(0.015)
     assert isinstance(hover_power(mission(TAKEOFF, bat=table_of(Volt=[12.0], Curr=[0.0])), {}), Unavailable)
+    del flown.tables["ARM"]
+    stood = Mission(Flight(TablesLog(dict(flown.tables), 100.0)), flown.tables, 0.0, 100.0, True, {})
+    assert hover_power(stood, {}) == NEVER_ARMED, "what it takes on the ground is no flight"

@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from care_core.diagnose.judging import read_and_judge
 from care_core.ecosystems.examine import examine
+from care_core.ecosystems.findings import every_finding
 from care_core.ecosystems.registry import run_model
 from care_core.errors import LogError
 from care_core.logs.file_windows import FileArray
@@ -23,6 +24,7 @@ from care_core.logs.mavlink import MavlinkLog
 from care_core.logs.mavlink_packets import find_packets
 from care_core.logs.opening import open_log
 from care_core.logs.shared_id import _turns
+from care_core.logs.telemetry import as_dataflash
 from care_core.profile.store import load_profile
 from tests.groundstation import write_tlog
 
@@ -65,6 +67,23 @@ def flight(count: int = 40) -> Station:
     for number in range(count):
         station.hear(attitude(number / 8), v1=number % 2 == 0)
     return station
+
+
+def test_a_text_ends_with_its_last_word(tmp_path: Path) -> None:
+    station = flight(4).hear(mavlink.MAVLink_statustext_message(4, b"Failsafe activated\t"))
+    texts = as_dataflash(MavlinkLog(station.write(tmp_path / "a.tlog"))).read({"MSG": ("Message",)})["MSG"]
+    assert texts["Message"].tolist() == ["Failsafe activated"]
+
+
+def test_a_rover_that_is_driven_and_stands_is_seen_from_the_ground(tmp_path: Path) -> None:
+    station = Station().hear(heartbeat(kind=10, armed=128))
+    for number in range(60):
+        drives = 0.0 if number > 20 else 1.0
+        station.hear(mavlink.MAVLink_heartbeat_message(10, 3, 0x51 | 128, 10, 4, 3))
+        station.hear(mavlink.MAVLink_vfr_hud_message(0.0, drives, 0, 100, 0.0, 0.0))
+        station.hear(attitude(0.0))
+    health = examine(run_model(MavlinkLog(station.write(tmp_path / "a.tlog"))))
+    assert "the vehicle is driven and does not move" in [one.title for one in every_finding(health.findings)]
 
 
 def test_both_versions_and_cut_zeros_are_read(tmp_path: Path) -> None:

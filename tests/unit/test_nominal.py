@@ -213,10 +213,11 @@ def test_px4_comes_down_later_from_higher_up_and_more_slowly(descent: float, hei
 
 
 PLANE = {
-    "speed": 20.0, "least_speed": 12.0, "most_speed": 30.0, "commanded_speed": 0.0, "path_length": 2000.0,
-    "loiter_turns": 0.0, "loiters": 0.0, "loiter_radius": 80.0, "hold_time": 0.0, "returns": 0.0,
-    "return_distance": 500.0, "period": 15.0, "leg_after_loiter": 0.0, "rises": 0.0, "first_rise": 0.0,
-    "first_length": 200.0, "legs_length": 1000.0, "climb_rate": 5.0,
+    "speed": 20.0, "least_speed": 12.0, "most_speed": 30.0, "commanded_speed": 0.0, "loiter_turns": 0.0,
+    "loiters": 0.0, "loiter_radius": 80.0, "hold_time": 0.0, "period": 15.0, "leg_after_loiter": 0.0, "rises": 0.0,
+    "first_rise": 0.0, "first_length": 200.0, "legs_length": 1000.0, "climb_rate": 5.0, "way_out": 2000.0,
+    "way_back": 0.0, "home_height": 0.0, "climbs": 0.0, "level_power": 150.0, "climb_speed": 2.5, "descent_speed": 1.5,
+    "takeoff_height": 30.0, "end_height": 60.0, "return_height": 15.0,
 }  # fmt: skip
 
 
@@ -228,21 +229,48 @@ def plane(kind: str, **changed: float) -> float:
 
 def test_a_planes_mission_is_its_legs_and_its_circles() -> None:
     straight = plane("plane_mission_time")
-    assert plane("plane_mission_time", path_length=2200.0) - straight == pytest.approx(10.0)
-    assert plane("plane_mission_time", returns=1.0) - straight == pytest.approx(25.0)
+    assert plane("plane_mission_time", way_out=2200.0) - straight == pytest.approx(10.0)
     circle_s = 2 * np.pi * 80.0 / 20.0
     waits, turns = plane("plane_mission_time", hold_time=15.0, loiters=1.0), plane("plane_mission_time", loiter_turns=1)
     assert 15.0 < waits - straight < 15.0 + circle_s, "it has to find the circle, and its course out of it"
     assert circle_s < turns - straight < 2 * circle_s
 
 
+def test_a_plane_returns_at_its_own_airspeed_whatever_the_mission_commanded() -> None:
+    slow = plane("plane_mission_time", commanded_speed=15.0)
+    assert plane("plane_mission_time", commanded_speed=15.0, way_back=500.0) - slow == pytest.approx(25.0)
+
+
+def test_in_thin_air_a_plane_flies_faster_over_ground() -> None:
+    # At 2000 m the density is 1.0065 kg/m^3, at the sea 1.225 (ISO 2533).
+    faster = float(np.sqrt(1.225 / 1.0065))
+    assert plane("plane_leg_speed", home_height=2000.0) == pytest.approx(20.0 * faster, rel=1e-3)
+    assert plane("plane_airspeed", home_height=2000.0) == 20.0
+    sea, high = (plane("plane_mission_time", home_height=height) for height in (0.0, 2000.0))
+    assert sea - high == pytest.approx(100.0 * (1 - 1 / faster), rel=1e-3)
+
+
+def test_a_planes_energy_is_that_of_its_way_its_climbs_and_its_take_off() -> None:
+    level = plane("plane_energy")
+    assert plane("plane_energy", level_power=300.0) == pytest.approx(2 * level)
+    assert plane("plane_energy", way_back=440.0) - level == pytest.approx(150.0 * (20 / 22) ** 3.7 * 22.0 / 3600)
+    twice = plane("plane_energy", way_out=4000.0) - level
+    assert plane("plane_energy", way_out=4000.0, speed=30.0) - plane("plane_energy", speed=30.0) == pytest.approx(
+        twice * 1.5**2.7
+    ), "it is there sooner, and takes more"
+    assert plane("plane_energy", climbs=100.0) > level
+
+
 def test_a_quadplane_has_constants_of_its_own() -> None:
-    straight = plane("quadplane_mission_time")
-    assert plane("quadplane_mission_time", returns=1.0) - straight == pytest.approx(25.0)
-    assert plane("quadplane_mission_time", loiter_turns=1.0) - straight == pytest.approx(2 * np.pi * 80.0 / 20.0)
-    assert plane("quadplane_path_error", leg_after_loiter=1.0) == pytest.approx(100.0)
-    assert plane("plane_path_error", leg_after_loiter=1.0) == pytest.approx(96.0)
-    assert plane("quadplane_height_error", rises=200.0) - plane("quadplane_height_error") == pytest.approx(0.2)
+    lands = plane("quadplane_mission_time")
+    assert plane("quadplane_mission_time", end_height=90.0) - lands == pytest.approx(20.0)
+    assert plane("quadplane_mission_time", takeoff_height=55.0) - lands == pytest.approx(10.0)
+    assert plane("quadplane_mission_time", way_back=500.0) - lands == pytest.approx(25.0 - 30.0), (
+        "from the return's height"
+    )
+    for kind in ("mission_time", "path_error", "height_error"):
+        changed = {"loiter_turns": 1.0, "leg_after_loiter": 1.0, "rises": 200.0}
+        assert plane(f"quadplane_{kind}", **changed) != pytest.approx(plane(f"plane_{kind}", **changed))
 
 
 def test_a_plane_is_below_its_leg_while_the_way_to_it_left_no_time_to_climb() -> None:

@@ -203,6 +203,17 @@ def test_refusals_of_rovers_and_boards_name_what_they_read(text: str, settings: 
     assert named in refused(text, **settings).parameters
 
 
+def test_of_a_rovers_outputs_those_are_named_that_have_what_it_lacks_as_shipped() -> None:
+    outputs = {"SERVO1_FUNCTION": (51, 26), "SERVO3_FUNCTION": (0, 70), "SERVO6_FUNCTION": (70, 0)}
+    assert refused("check steering and throttle config", **outputs).parameters == ("SERVO1_FUNCTION",)
+
+
+def test_what_wants_a_position_is_no_reason_beside_a_receiver_without_a_fix() -> None:
+    off = {"FENCE_ENABLE": (1, 0)}
+    assert refused("Fence requires position", **off).parameters == ("FENCE_ENABLE",)
+    assert not refused("GPS 1: Bad fix", "Fence requires position", **off).parameters
+
+
 def test_a_refusal_where_nothing_that_it_reads_is_off_stays_as_it_is() -> None:
     for text in ("Need Position Estimate", "GPS 1: Bad fix", "Check mag field (xy diff:130>100)"):
         finding = refused(text, EK3_SRC1_POSXY=(3, 3), GPS_TYPE=(1, 1), COMPASS_OFS_X=(43, 0), GPS_RATE_MS=(200, 200))

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from care_core.ecosystems.ardupilot.measures import hover, winged  # noqa: F401  they register their extractors
+from care_core.ecosystems.ardupilot.measures import hover, whole_way, winged  # noqa: F401  they register their extractors
 from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
+from care_core.ecosystems.ardupilot.measures.shortfall import short_of
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
 from care_core.logs.base import Table
 from care_core.run import Unavailable, Value
@@ -154,6 +155,22 @@ def test_a_plane_that_stays_on_the_ground_never_climbed() -> None:
     assert value("never_climbed", mission(POS=tables["POS"])) == 1.0
 
 
+def test_firmware_that_says_nothing_of_its_items_writes_each_as_it_begins_it() -> None:
+    tables = flown()
+    items = tables["CMD"]
+    begun = [1, 2, 3, 4]
+    old = {name: column[begun] for name, column in items.columns.items()}
+    cmd = Table(np.array([10.0, 20.0, 25.0, 40.0]), old)
+    quad = mission("ArduCopter V3.2.1", CMD=cmd, MSG=Table(np.empty(0), {}), MODE=table([(0.0, 3)], "ModeNum"))
+    assert quad.shared(analyse).reached == 2, "it went on from both after it had been there"
+    newer = mission("ArduCopter V4.5.4", CMD=cmd, MSG=Table(np.empty(0), {}), MODE=table([(0.0, 3)], "ModeNum"))
+    assert newer.shared(analyse).reached == 0
+    nowhere = {"ORGN": Table(np.empty(0), {}), "POS": Table(np.empty(0), {})}
+    lost = mission("ArduCopter V3.2.1", CMD=cmd, MSG=Table(np.empty(0), {}), **nowhere)
+    assert (lost.shared(analyse).reached, lost.shared(analyse).untold) == (0, 2)
+    assert short_of(lost) == "at most 2 of 3 waypoints were reached"
+
+
 @pytest.mark.parametrize("kind", ["leg_error", "leg_speed", "height_error", "airspeed_error", "level_power"])
 def test_a_flight_that_completed_no_leg_says_so(kind: str) -> None:
     answer = value(kind, mission(MSG=table([(20.0, "Mission: 2 WP")], "Message")))
@@ -211,6 +228,52 @@ def test_a_circle_of_its_own_radius_is_no_circle_of_the_parameter() -> None:
     assert value("legs_asked", flight, what="loiters") == pytest.approx(0.85 * 2 * 120.0 / 60.0)
     assert value("legs_asked", what="loiters") == 0.0, "the parameter's circles are counted as turns"
     assert value("mission_asked", flight, what="hold_time") == pytest.approx(2 * math.tau * 120.0 / 12.0)
+
+
+def returning(*landing: tuple[int, float, float, float], **settings: float) -> Mission:
+    """A flight whose mission returns after its third waypoint; (command, north, east, height) of the items behind."""
+    items = [(22, 0.0, 0.0, 40.0), *((16, *place) for place in WAY[:3]), (20, 0.0, 0.0, 0.0), *landing]
+    rows = [
+        (0.0, k, c, 0.0, 0.0, HOME[0] + n / METRES, HOME[1] + e / EAST, up, 3)
+        for k, (c, n, e, up) in enumerate([(16, 0.0, 0.0, 0.0), *items])
+    ]
+    flight = mission(CMD=table(rows, "CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame"))
+    flight.settings.update(settings)
+    return flight
+
+
+SEQUENCE = ((189, 0.0, 0.0, 0.0), (16, -600.0, 0.0, 60.0), (16, -300.0, 0.0, 30.0), (21, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("flight", "back"),
+    [
+        (returning(), 300.0),
+        (returning(*SEQUENCE, RTL_AUTOLAND=0), 300.0),
+        (returning(*SEQUENCE, RTL_AUTOLAND=1), 300.0 + 600.0 + 300.0 + 300.0),
+        (returning(*SEQUENCE, RTL_AUTOLAND=2), math.hypot(600.0, 300.0) + 300.0 + 300.0),
+    ],
+    ids=["no landing", "circles over home", "lands from home", "lands at once"],
+)
+def test_the_way_back_is_what_the_return_flies(flight: Mission, back: float) -> None:
+    assert value("way_asked", flight, what="out") == pytest.approx(900.0, abs=0.1)
+    assert value("way_asked", flight, what="back") == pytest.approx(back, abs=0.1)
+
+
+def test_a_mission_that_lands_has_no_way_back() -> None:
+    assert value("way_asked", what="back") == 0.0
+    assert value("way_asked", what="out") == pytest.approx(900.0 + math.hypot(600.0, 300.0) + 600.0, abs=0.1)
+
+
+def test_a_return_is_flown_at_its_height() -> None:
+    assert value("way_asked", returning(RTL_ALTITUDE=100.0), what="climbs") == 100.0
+    assert value("way_asked", returning(RTL_ALTITUDE=50.0), what="climbs") == 80.0
+
+
+def test_home_has_a_height_where_the_log_tells_it() -> None:
+    assert value("home_height") == 500.0
+    nowhere = table([(1.0, 1, *HOME)], "Type", "Lat", "Lng")
+    assert isinstance(value("home_height", mission(ORGN=nowhere)), Unavailable)
 
 
 @pytest.mark.parametrize(("what", "expected"), [(0, 27.0), (1, 0.0)], ids=["airspeed", "ground speed"])

@@ -8,7 +8,7 @@ import pytest
 from care_core.ecosystems.ardupilot.checks.wings.airspeed import SENSOR_SILENT
 from care_core.ecosystems.findings import Finding, every_finding
 from tests.flights import DOWN_S
-from tests.planes import HEIGHT_M, MadePlane
+from tests.planes import CRUISE_MS, HEIGHT_M, MadePlane
 
 RATES_HZ = (10.0, 2.5)
 
@@ -382,3 +382,16 @@ def test_an_airspeed_sensor_that_is_used_and_reads_nothing_in_the_air_is_told(fi
     made.settings["ARSPD_TYPE"] = fitted
     made.table["ARSP"]["Airspeed"] = 0.1 * np.abs(made.noise(0.1))
     assert (SENSOR_SILENT in {one.title for one in every_finding(made.find())}) == is_told
+
+
+@pytest.mark.parametrize(("pitch", "is_told"), [(-12.0, True), (8.0, False)], ids=["nose down", "nose up"])
+def test_an_elevator_that_is_up_while_the_nose_stays_down(pitch: float, is_told: bool) -> None:
+    made = MadePlane()
+    runs = made.after(16.0)
+    made.table["POS"]["RelHomeAlt"][:] = made.noise(0.02)
+    made.table["GPS"]["Spd"][runs] = CRUISE_MS + 5.0
+    made.table["AETR"]["Elev"][runs] = 4300.0
+    made.table["ATT"]["Pitch"][runs] = pitch
+    made.table["PIDP"]["Tar"][runs], made.table["PIDP"]["Act"][runs] = 60.0, made.noise(0.5)[runs]
+    titles = [one.title for one in every_finding(made.find())]
+    assert ("the elevator is up, and the nose stays down" in titles) == is_told

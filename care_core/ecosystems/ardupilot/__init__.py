@@ -34,6 +34,7 @@ class ArduPilot(Ecosystem):
         "care_core.ecosystems.ardupilot.measures.rover",
         "care_core.ecosystems.ardupilot.measures.route",
         "care_core.ecosystems.ardupilot.measures.signals",
+        "care_core.ecosystems.ardupilot.measures.whole_way",
         "care_core.ecosystems.ardupilot.measures.winged",
     )
 

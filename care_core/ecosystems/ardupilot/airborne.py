@@ -99,8 +99,9 @@ _SPINS_DEG_S, _HALF_TURN_DEG = 400.0, 180.0
 """A copter that turns so fast about its level axes, and so far, in a mode that keeps it level has turned over."""
 _TAXIES_MS = 8.0
 """Faster over ground, a plane flies or is about to; against a gale its height tells."""
-_CAUGHT_S, _CAUGHT_M = 2.0, 1.0
-"""What leans so far that its motors lift nothing falls by 20 m in this time, and was caught if by less than this."""
+_CAUGHT_S, _CAUGHT_M, _TRAVELS_MS = 2.0, 1.0, 2.0
+"""What leans so far that its motors lift nothing falls by 20 m in this time, and was caught if by less than this; what
+is caught goes nowhere."""
 _TUMBLING_DEG, _TUMBLES_S = 45.0, 2.0
 _ROLLS = frozenset((UNKNOWN_MODE, 0, 3, 4, 23))
 """Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; any where the log does not say."""
@@ -579,9 +580,15 @@ class Airborne(Armed):
             return False
         heights = known[1][(known[0] >= lost) & (known[0] <= lost + _CAUGHT_S)]
         lies = leans[1][(leans[0] >= lost + _CAUGHT_S / 2) & (leans[0] <= lost + _CAUGHT_S)]
-        if len(heights) < 3 or len(lies) < 3:
+        if len(heights) < 3 or len(lies) < 3 or self._travels(lost + _CAUGHT_S / 2, lost + _CAUGHT_S):
             return False
         return bool(np.min(lies) > _OVER_DEG and np.min(heights) > _GROUND_M and np.ptp(heights) < _CAUGHT_M)
+
+    def _travels(self, start: float, end: float) -> bool:
+        """Whether its receiver says that it goes on its way all the time."""
+        moved = self.one("GPS", "Spd")
+        going = None if moved is None else moved["Spd"][(moved.t >= start) & (moved.t <= end)]
+        return going is not None and len(going) > 2 and bool(np.min(going) > _TRAVELS_MS)
 
     def _blows(self) -> Iterator[tuple[float, float]]:
         """Each time that it was shaken beyond what flight does, and by how much, m/s^2; 0 where all that is

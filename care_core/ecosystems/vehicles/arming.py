@@ -9,6 +9,7 @@ from care_core.run import Unavailable
 
 NEVER_ARMED = Unavailable("the vehicle never armed", "see why arming was refused")
 CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
+GOES_ON = Unavailable("the log goes on and does not tell that the vehicle disarmed", "record ARM")
 """Why what only a flight, or only its end, would tell is not known."""
 
 _METHODS: Mapping[int, str] = {

@@ -116,7 +116,7 @@ def _not_charged(flight: Flight, rest: float, cells: int, lowest: float | None) 
         end_s=flight.watched[-1][1],
         severity=severity,
         evidence=(
-            f"{rest:.1f} V at rest before take-off, {rest / cells:.2f} V for each of {cells} cells "
+            f"{rest:.1f} V at rest, {rest / cells:.2f} V for each of {cells} cells "
             f"(full {FULL_V}, limit {NOT_FULL})"
             + _flown_down(flight, rest, cells)
             + ("" if lowest is None else f"; down to {_under_load(lowest, cells)}")

@@ -48,6 +48,11 @@ GREY = LIMITS.add("share of the field from the motors", 0.3, "", "ArduPilot, Com
 TOO_MUCH = LIMITS.add("share that makes it unusable", 0.6, "", "ArduPilot, Compass setup")
 _FOLLOWS = LIMITS.add("correlation of field and throttle", 0.6, "", "a choice: turning moves the field as well")
 _SPREAD = LIMITS.add("spread of the throttle to compare with", 0.15, "", "a choice: less tells nothing")
+_PLACE = LIMITS.add(
+    "share of it that the field may have changed at rest", 0.5, "", "a choice: what stays without current is the place"
+)
+_TURNS = LIMITS.add("share of the throttle's spread above which motors turn", 0.1, "", "a choice: idling takes little")
+_RESTS = LIMITS.add("records at rest before and after", 10.0, "", "a choice: a second at 10 Hz")
 _SHORTEST = LIMITS.add("shortest field", 185.0, "mGauss", "AP_Arming's limits of the field")
 _LONGEST = LIMITS.add("longest field", 875.0, "mGauss", "AP_Arming's limits of the field")
 _LASTS_S = LIMITS.add("shortest disturbance", 3.0, "s", "a choice: passing steel is over sooner")
@@ -253,8 +258,9 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     base, slope = _line(x, y)
     with np.errstate(invalid="ignore"):
         match = float(np.corrcoef(x, y)[0, 1])
-    share = abs(slope) * quantile(x, 0.95) / max(base, 1.0)
-    if share > GREY and abs(match) > _FOLLOWS:
+    effect = abs(slope) * quantile(x, 0.95)
+    share = effect / max(base, 1.0)
+    if share > GREY and abs(match) > _FOLLOWS and _changed_at_rest(x, y) < _PLACE * effect:
         yield Finding(
             kind="compass",
             title="the motors' currents disturb the compass",
@@ -268,6 +274,15 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             source="MAG against CTUN.ThO; ArduPilot, Compass setup",
             probability=_MOTORS_MUCH_P if share > TOO_MUCH else _MOTORS_P,
         )
+
+
+def _changed_at_rest(throttle: Floats, strength: Floats) -> float:
+    """How much the field changed from before the motors first turned to after they last did: what is in the ground
+    where it took off, or where it landed, stays when they stop. 0 where one of both is not in the log."""
+    turns = np.flatnonzero(throttle > throttle.min() + _TURNS * np.ptp(throttle))
+    before, after = strength[: turns[0]], strength[turns[-1] + 1 :]
+    enough = min(len(before), len(after)) >= _RESTS
+    return abs(float(median(after)) - float(median(before))) if enough else 0.0
 
 
 def _line(x: Floats, y: Floats) -> tuple[float, float]:

@@ -49,6 +49,11 @@ _CODES = LIMITS.add("greatest default of a code", 10.0, "", "a choice: another c
 _FULL_AT = LIMITS.add("cell that reads full", CHARGED_V, "V", "voltages of lithium polymer cells")
 _NONE_AT = LIMITS.add("cell that no pack has", HARMED_V, "V", "voltages of lithium polymer cells")
 _MOTOR = re.compile(r"no SERVOx_FUNCTION set to Motor(\d+)")
+_STEERS = re.compile(r"steering and throttle config", re.IGNORECASE)
+_STEERING_AND_THROTTLE = (26.0, 70.0)
+"""SERVOn_FUNCTION of a rover that does not steer by its wheels' speeds (Rover/AP_MotorsUGV.cpp: pre_arm_check)."""
+_NO_FIX = re.compile(r"GPS \d: (Bad|No|no) (fix|GPS)|need 3D fix", re.IGNORECASE)
+_WANTS_POSITION = re.compile(r"requires? position", re.IGNORECASE)
 _RECEIVER = re.compile(r"GPS\d?_TYPE\d?")
 _STICKS = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_THROTTLE", "RCMAP_YAW")
 _OFF, _ANSWERS, _BY_GPS = 0, 1, 3
@@ -114,6 +119,8 @@ def refusing(flight: Flight) -> tuple[Refusing, ...]:
     """The parameters behind the refusals that stood: those that cannot hold, else those that are off."""
     last = standing(flight)
     complaints = dict.fromkeys(one.why for one in last)
+    if any(map(_NO_FIX.search, complaints)):  # whatever wants a position is met by the fix
+        complaints = {why: None for why in complaints if not _WANTS_POSITION.search(why)}
     found = [one for why in complaints for one in _behind(flight, why, last[-1].time_s)]
     others = (each for why in complaints for each in _other_motors(flight, why))
     found += [one._replace(is_beside=True) for why in others for one in _behind(flight, why, last[-1].time_s)]
@@ -143,7 +150,7 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
     values = dict(_values(flight.settings, at_s))
     is_outside = "world" in reads.also
     read = [name for name in reads.parameters if name in values and name not in flight.shown_right]
-    held = [_setting_of(flight, name, values[name]) for name in read]
+    held = _of_lacking_outputs(flight, why, [_setting_of(flight, name, values[name]) for name in read])
     if "voltage" in reads.also:
         yield from (_refusing(one, OFF, is_shown=True) for one in _of_voltage(flight, held, why))
         return
@@ -165,6 +172,15 @@ def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
     else:
         sure = OFF * OUTSIDE if is_outside else OFF
         yield from (_unproven(flight, _refusing(one, sure), one) for one in held if one.is_far_off)
+
+
+def _of_lacking_outputs(flight: Flight, why: str, held: list[_Held]) -> list[_Held]:
+    """Of a rover that lacks steering or throttle the outputs that have it as shipped: the others are what they are."""
+    if not _STEERS.search(why):
+        return held
+    driven = {flight.setting(f"SERVO{n}_FUNCTION") for n in OUTPUTS}
+    lacking = [one for one in held if one.default in _STEERING_AND_THROTTLE and one.default not in driven]
+    return lacking or held
 
 
 def _unproven(flight: Flight, refusing: Refusing, one: _Held) -> Refusing:

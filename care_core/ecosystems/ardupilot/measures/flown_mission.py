@@ -53,6 +53,7 @@ NEEDS: Wanted = merge_needs((
 PASSED_M = 5.0
 """As near to a waypoint it was there: copters and rovers count one as reached within 2 m unless told otherwise."""
 
+_SAYS, _AT_ONCE_S = (3, 3), 0.5
 _HOMEWARD = (RETURN, LAND)
 _LEADING = frozenset((*PLACES, *_HOMEWARD))
 """Items that lead somewhere."""
@@ -146,7 +147,7 @@ def analyse(mission: Mission) -> FlownMission:
         started.setdefault(numbers[0], drive.start_s)  # named once, before the vehicle may move
     route = np.array([offset_m(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
     corners, end = _way(mission.shared(requested_mission))
-    places = dict(zip(numbers, route, strict=True)) if len(route) else {}
+    places = dict(zip(numbers, route, strict=True)) if len(route) else dict.fromkeys(numbers)
     passed = _passed(mission, track, places, started, reached, lands=drive is None)
     return FlownMission(
         waypoints=waypoints,
@@ -186,11 +187,12 @@ def _waypoints_to_reach(mission: Mission, held: HeldMission) -> list[int]:
 
 
 def _passed(
-    mission: Mission, track: Track | None, places: Mapping[int, Floats], started: Mapping[int, float],
+    mission: Mission, track: Track | None, places: Mapping[int, Floats | None], started: Mapping[int, float],
     reached: Mapping[int, float], *, lands: bool,
 ) -> dict[int, bool | None]:  # fmt: skip
     """Of each waypoint that was not said to be reached, whether the vehicle went on from it after it had passed there;
-    None where it went on and nothing tells where it was."""
+    None where it went on and nothing tells where it was, or where the waypoint is: `places` are north and east of a
+    home."""
     told = [*started.items(), *((number + 0.5, t) for number, t in reached.items())]
     if lands and track is not None and track.height.max() > AIRBORNE_M and _ends_by_itself(mission):
         told.append((math.inf, mission.end_s))
@@ -201,7 +203,11 @@ def _passed(
             continue
         before = max((t for at, t in told if at <= number), default=mission.start_s)
         part = None if track is None else track.between(before, min(later))
-        if part is None or doubt(samples(mission, "POS", ("Lat", "Lng"), [(before, min(later))], EXTREME)):
+        if (
+            place is None
+            or part is None
+            or doubt(samples(mission, "POS", ("Lat", "Lng"), [(before, min(later))], EXTREME))
+        ):
             found[number] = None
             continue
         way = np.column_stack((part.north, part.east))
@@ -265,7 +271,21 @@ def _milestones(mission: Mission) -> tuple[dict[int, float], dict[int, float]]:
             match = pattern.match(text)
             if match:
                 found.setdefault(int(match[1]), t)
-    return started, reached
+    return started or _items_as_begun(mission), reached
+
+
+def _items_as_begun(mission: Mission) -> dict[int, float]:
+    """When each item was first written by itself. Firmware before 3.3 says nothing of its items, and writes each as it
+    begins it (ArduCopter/commands_logic.cpp: start_command); a whole mission is written at once."""
+    version, items = flight_of(mission).vehicle.version, mission.table("CMD")
+    if version is None or version[:2] >= _SAYS or items is None or not has(items, "CNum"):
+        return {}
+    apart = np.diff(items.t, prepend=-np.inf) > _AT_ONCE_S
+    apart &= np.append(apart[1:], True)
+    started: dict[int, float] = {}
+    for t, number in zip(items.t[apart].tolist(), items["CNum"][apart].tolist(), strict=True):
+        started.setdefault(int(number), t)
+    return started
 
 
 def _phases(

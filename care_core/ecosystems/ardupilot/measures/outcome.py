@@ -17,7 +17,13 @@ from care_core.ecosystems.ardupilot.measures.events import (
     never_asked,
     was_asked,
 )
-from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, FlownMission, analyse, metres_between
+from care_core.ecosystems.ardupilot.measures.flown_mission import (
+    NEEDS,
+    SAID_AFTER_S,
+    FlownMission,
+    analyse,
+    metres_between,
+)
 from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.ardupilot.measures.route import landing_error
@@ -26,7 +32,7 @@ from care_core.ecosystems.ardupilot.measures.shortfall import event_clause, land
 from care_core.ecosystems.coverage import SUM, doubt
 from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
-from care_core.ecosystems.vehicles.arming import CUT, NEVER_ARMED
+from care_core.ecosystems.vehicles.arming import CUT, GOES_ON, NEVER_ARMED
 from care_core.ecosystems.vehicles.way import AIRBORNE_M
 from care_core.geodesy import GRAVITY
 from care_core.logs.base import Wanted
@@ -106,7 +112,7 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Out
         yield OutcomeCheck("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
     elif done == 1.0 and not mission.ended:
         return  # what stands on the ground when all is done comes to no harm by staying armed
-    at_end: Value = float(landed == 1.0 or not forced(mission)) if mission.ended else CUT
+    at_end: Value = float(landed == 1.0 or not forced(mission)) if mission.ended else _no_end(mission)
     if mission.ended and not flight_of(mission).arm_changes:
         at_end = UNRECORDED
     yield OutcomeCheck("disarmed", at_end, "it was disarmed, and not by force in flight", "it was disarmed by force")
@@ -128,13 +134,18 @@ def _mission_done(mission: Mission) -> Value:
     if flown.untold:
         return _UNTOLD
     if not mission.ended:
-        return CUT
+        return _no_end(mission)
     last = modes_in_force(mission)[-1]
     if last.way == "mission":
         return lost_events(mission) or 0.0
     return Unavailable(
         f"{short_of(mission)}, and the last mode was {last.name}", "judge a run that ends in its mission"
     )
+
+
+def _no_end(mission: Mission) -> Unavailable:
+    """Why the end of a run is not known that is not in the log."""
+    return GOES_ON if mission.end_s < flight_of(mission).whole.end_s - SAID_AFTER_S else CUT
 
 
 def _moved(mission: Mission) -> Value:
@@ -176,7 +187,7 @@ def _landed(mission: Mission) -> Value:
     if not is_known(_took_off(mission, crashed=False)):
         return _took_off(mission, crashed=False)
     if not mission.ended:
-        return CUT
+        return _no_end(mission)
     heights = _heights(mission)
     if _touched_down(mission):
         return 1.0
@@ -262,7 +273,7 @@ def mission_success(mission: Mission, args: Args) -> Value:
         return 0.0 if mission_refused(mission) else Unavailable("no mission was flown")
     if failed(mission):
         return 0.0
-    return _mission_flown(mission) if is_over(mission) else CUT
+    return _mission_flown(mission) if is_over(mission) else _no_end(mission)
 
 
 def mission_refused(mission: Mission) -> bool:

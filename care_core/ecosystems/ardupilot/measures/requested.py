@@ -33,6 +33,7 @@ from care_core.ecosystems.ardupilot.measures.samples import samples, whole
 from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.coverage import USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
+from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, number_asked
 from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted
@@ -82,7 +83,7 @@ def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     circle_s, airspeed_ms = _circle_s(mission), _airspeed_ms(mission)
     # a ground speed is no more than the least that a plane's airspeed is to bring
     counted = (_AIRSPEED,) if flight_of(mission).kind in _WINGED else (_AIRSPEED, _GROUNDSPEED)
-    for item in _followed(held.items):
+    for item in followed(held.items):
         if item.command == TAKEOFF:
             points[0] = (0.0, 0.0, _height(item, home))
         elif item.command == CHANGE_SPEED and item.first in counted:
@@ -131,7 +132,7 @@ def trails_m(mission: Mission) -> float:
     version = flight.vehicle.version
     if isinstance(held, Unavailable) or not flight.is_copter or version is None or version[:2] >= _STOPS:
         return 0.0
-    leading = [item for item in _followed(held.items) if item.command in (*PLACES, RETURN, LAND)]
+    leading = [item for item in followed(held.items) if item.command in (*PLACES, RETURN, LAND)]
     way = list(takewhile(lambda item: item.command in PLACES, leading))
     last = leading[len(way)] if len(way) < len(leading) else None
     if not way or way[-1].first > 0 or last is None or last.command != LAND or last.lat or last.lng:
@@ -200,7 +201,7 @@ def _is_done(flight: Flight, held: HeldMission, begun_s: float, end_s: float, re
     return reached.issuperset(held.waypoints) and not any(t > replaced_s for t, _ in told)
 
 
-def _followed(items: Mapping[int, Item]) -> Iterator[Item]:
+def followed(items: Mapping[int, Item]) -> Iterator[Item]:
     """The items in the order in which they are flown."""
     left = {number: int(item.second) for number, item in items.items() if item.command == JUMP}
     number, count = min(items), 0
@@ -280,6 +281,8 @@ def internal_resistance(mission: Mission, args: Args) -> Value:
 
 def _in_the_air(mission: Mission, *fields: str) -> Table | Unavailable:
     """The first battery's rows with a current, in the flight."""
+    if not is_armed(mission):
+        return NEVER_ARMED
     table = mission.table("BAT")
     if table is None or not has(table, "Curr", *fields):
         return missing(f"BAT with {' and '.join(fields)}")

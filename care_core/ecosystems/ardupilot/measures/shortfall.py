@@ -63,8 +63,10 @@ def landing_tolerance_m(mission: Mission) -> float:
 
 
 def short_of(mission: Mission) -> str:
-    """How many of its waypoints a mission reached."""
+    """How many of its waypoints a mission reached, at most where it went on from some without a word."""
     flown = mission.shared(analyse)
+    if flown.untold:
+        return f"at most {flown.reached + flown.untold} of {len(flown.waypoints)} waypoints were reached"
     return f"{flown.reached} of {len(flown.waypoints)} waypoints were reached"
 
 

@@ -211,8 +211,20 @@ def legs_flown(mission: Mission) -> list[Span] | Unavailable:
 def on_legs(mission: Mission, channel: str, *fields: str) -> Table | Unavailable:
     """Rows of the first instance of a channel on those legs, with all of `fields` finite."""
     spans = legs_flown(mission)
-    if isinstance(spans, Unavailable):
-        return spans
+    return spans if isinstance(spans, Unavailable) else _within(mission, spans, channel, *fields)
+
+
+def under_way(mission: Mission) -> list[Span] | Unavailable:
+    """From the start of the way to the first waypoint to the arrival at the last that was reached: all but the take-off
+    and the landing."""
+    flown = mission.shared(analyse)
+    legs = [phase for (name, _), phase in flown.phases.items() if name == "leg"]
+    if not legs:
+        return Unavailable("the flight completed no leg")
+    return [(min(leg.start_s for leg in legs), max(leg.end_s for leg in legs))]
+
+
+def _within(mission: Mission, spans: Sequence[Span], channel: str, *fields: str) -> Table | Unavailable:
     table = mission.table(channel)
     if table is None:
         return missing(channel)
@@ -226,9 +238,9 @@ def on_legs(mission: Mission, channel: str, *fields: str) -> Table | Unavailable
     return rows if len(rows) >= MIN_ROWS else Unavailable(f"too little {channel} on the legs")
 
 
-def _rests_on(channels: Sequence[str]) -> RestsOn:
+def _rests_on(channels: Sequence[str], over: Callable[[Mission], Sequence[Span] | Unavailable] = legs_flown) -> RestsOn:
     def rests_on(mission: Mission, args: Args) -> Iterator[Samples]:
-        spans = legs_flown(mission)
+        spans = over(mission)
         for channel in channels:
             bears = EXTREME if args.get("stat") in ("max", "min") else USUAL
             yield samples(mission, channel, (), () if isinstance(spans, Unavailable) else spans, bears)
@@ -367,13 +379,17 @@ def surface_rate_error(mission: Mission, args: Args) -> Value:
         "airspeed": numeric("airspeed in m/s at which the power is given"),
         "power": numeric("by which power of the airspeed it grows; 3 unless given"),
     },
-    rests_on=_rests_on(["BAT", "CTUN"]),
+    rests_on=_rests_on(["BAT", "CTUN"], under_way),
 )
 def level_power(mission: Mission, args: Args) -> Value:
-    """Electric power of a plane in straight and level flight, as it would be at `airspeed`: median."""
+    """Electric power of a plane in straight and level flight between take-off and landing, as it would be at
+    `airspeed`: median."""
+    spans = under_way(mission)
+    if isinstance(spans, Unavailable):
+        return spans
     tables = []
     for channel, fields in (("ATT", ("Roll",)), ("CTUN", ("As",)), ("TECS", ("dh",)), ("BAT", ("Volt", "Curr"))):
-        table = on_legs(mission, channel, *fields)
+        table = _within(mission, spans, channel, *fields)
         if isinstance(table, Unavailable):
             return table
         tables.append(table)
@@ -457,25 +473,17 @@ _LEGS: Mapping[str, Callable[[Legs, float], float]] = {
     "after_loiter": lambda legs, _start_m: legs.after_loiter,
     "loiters": lambda legs, _start_m: legs.loiters,
     "rises": lambda legs, _start_m: sum(max(leg.rise, 0.0) ** 2 for leg in legs.legs.values()),
-    "climbs": lambda legs, start_m: (
-        sum(max(leg.rise, 0.0) ** 2 for leg in legs.legs.values())
-        + (_FIRST_CLIMB * max(legs.corners[0].height - start_m, 0.0) ** 2 if legs.corners else 0.0)
-    ),
     "first_length": lambda legs, _start_m: math.hypot(*legs.way[1]) if legs.corners else 0.0,
     "first_rise": lambda legs, start_m: legs.first_rise(start_m),
 }
-
-_FIRST_CLIMB = 0.5
-"""The part of the climb to the first waypoint that is left when its leg is over, where nothing tells it."""
 
 
 @extractor("legs_asked", needs=NEEDS, unit="", args={"what": one_of(", ".join(_LEGS), *_LEGS)})
 def legs_asked(mission: Mission, args: Args) -> Value:
     """One number of the legs of a plane's mission that are judged: their `length` in m, the widest circle that one
-    begins on as a share of WP_LOITER_RAD (`after_loiter`), the squares of what they lead up, `rises` in m^2, and these
-    with a part of the climb to the first, `climbs`; of the way to the first of them its length and what it leads up,
-    `first_length` and `first_rise` in m; of the whole mission the circles that joining and leaving its loiters takes,
-    `loiters`, of WP_LOITER_RAD."""
+    begins on as a share of WP_LOITER_RAD (`after_loiter`) and the squares of what they lead up, `rises` in m^2; of the
+    way to the first of them its length and what it leads up, `first_length` and `first_rise` in m; of the whole mission
+    the circles that joining and leaving its loiters takes, `loiters`, of WP_LOITER_RAD."""
     legs, asked = mission.shared(legs_of), mission.shared(requested_mission)
     if isinstance(legs, Unavailable):
         return legs

@@ -108,7 +108,7 @@ def wrong_scale(flight: Flight) -> Finding | None:
         wanted = _near(scale * FULL_V * cells / rest, default)
         return _scale_finding(
             flight, "BATT_VOLT_MULT", wanted, rest,
-            f"{rest:.1f} V at rest before take-off, {rest / cells:.2f} V for each of {cells} cells, with "
+            f"{rest:.1f} V at rest, {rest / cells:.2f} V for each of {cells} cells, with "
             f"BATT_VOLT_MULT={scale:.4g} (default {default:.4g}, which would read {at_default:.1f} V: a full pack)",
         )  # fmt: skip
     pin = flight.default_left("BATT_VOLT_PIN")

@@ -42,6 +42,10 @@ _STOP = LIMITS.add("surface at its stop", 0.85, "of its travel", "a choice: what
 _STOP_S = LIMITS.add("shortest time at the stop", 5.0, "s", "a choice: a turn is over sooner")
 _LACKS_DPS = LIMITS.add("rate that is lacking at the stop", 4.0, "deg/s", "a choice: three times the noise of a rate")
 _ONE_SIDE = LIMITS.add("mean of a surface over its size", 0.6, "", "a choice: what swings goes both ways")
+_UP = LIMITS.add("elevator that is up on the take-off run", 0.5, "of its travel", "a choice: a rotation takes less")
+_OVER_LEAST = LIMITS.add("speed of that run", 1.2, "of AIRSPEED_MIN", "a choice: with less it may not fly yet")
+_DOWN_S = LIMITS.add("time in which the nose stays down", 3.0, "s", "a choice: a rotation is over in one")
+_LIFTED_M = LIMITS.add("height of what left the ground", 3.0, "m", "a choice: heights drift by less")
 _WRONG_WAY_P = LIMITS.add(
     "probability of a surface that turns it the wrong way", 0.9, "", "all 6 of 313 simulated flights that are turned so"
 )
@@ -101,7 +105,11 @@ def find(flight: Flight) -> Iterator[Finding]:
     for surface in _SURFACES:
         flown = _flown(flight, surface, level)
         if flown is not None:
-            found = _wrong_way(surface, flown) or _at_its_stop(flight, surface, flown)
+            found = (
+                _wrong_way(surface, flown)
+                or _keeps_it_down(flight, surface, flown)
+                or _at_its_stop(flight, surface, flown)
+            )
             if found is not None:
                 yield found
 
@@ -151,6 +159,39 @@ def _wrong_way(surface: _Surface, flown: _Flown) -> Finding | None:
             )
         ),
         source=f"AETR.{surface.output}, {surface.controller}.Tar, Act, ATT.{surface.attitude}",
+        probability=_WRONG_WAY_P,
+        mission_lost=_WRONG_WAY_P,
+    )
+
+
+def _keeps_it_down(flight: Flight, surface: _Surface, flown: _Flown) -> Finding | None:
+    """An elevator that is up on the take-off run, faster than the plane has to fly, while the nose stays down."""
+    if surface.attitude != "Pitch" or flight.height is None:
+        return None
+    t, height = flight.height
+    lifted = t[height > _LIFTED_M]
+    moved = flight.one("GPS", "Spd")
+    runs_on = flown.t < (lifted[0] if len(lifted) else np.inf)
+    fast = 0.0 if moved is None else np.interp(flown.t, moved.t, moved["Spd"])
+    least = _OVER_LEAST * (flight.setting("AIRSPEED_MIN") or flight.setting("ARSPD_FBW_MIN") or _FLIES_MS)
+    is_up = runs_on & (fast > least) & (flown.out > _UP) & (flown.angle < 0.0)
+    spans = lasting(flown.t, is_up, _DOWN_S)
+    if not spans:
+        return None
+    start, end = spans[0][0], spans[-1][1]
+    held = during(spans, flown.t)
+    return Finding(
+        kind="surface",
+        title="the elevator is up, and the nose stays down",
+        onset_s=start,
+        end_s=end,
+        severity="critical",
+        evidence=(
+            f"on the take-off run it is up by {100 * float(np.mean(flown.out[held])):.0f} % of the travel for "
+            f"{end - start:.0f} s above {least:.0f} m/s, with the nose at {float(np.mean(flown.angle[held])):.0f} deg: "
+            "reversed, jammed or not connected"
+        ),
+        source=f"AETR.{surface.output}, ATT.{surface.attitude}, GPS.Spd, AIRSPEED_MIN",
         probability=_WRONG_WAY_P,
         mission_lost=_WRONG_WAY_P,
     )
