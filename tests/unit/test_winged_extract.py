@@ -293,3 +293,11 @@ def test_a_field_that_an_old_firmware_lacks_is_told_from_a_missing_message() -> 
     assert lacking.reason == "no CTUN with As in the log"
     assert "LOG_BITMASK" not in lacking.hint
     assert isinstance(absent, Unavailable)
+
+
+@pytest.mark.parametrize(("forced", "reached"), [(0, 5), (1, 3)], ids=["by itself", "by force"])
+def test_what_was_disarmed_by_force_did_not_go_on_from_its_waypoints(forced: int, reached: int) -> None:
+    said = flown()["MSG"]
+    silent = said.where(said.t < 80.0)
+    arm = table([(5.0, 1, 0), (130.0, 0, forced)], "ArmState", "Forced")
+    assert mission(MSG=silent, ARM=arm).shared(analyse).reached == reached

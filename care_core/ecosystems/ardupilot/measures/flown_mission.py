@@ -218,10 +218,13 @@ def _passed(
 
 
 def _ends_by_itself(mission: Mission) -> bool:
-    """Whether the vehicle was disarmed in a mission that ends with a landing: what flew went on from every waypoint."""
+    """Whether the vehicle was disarmed in a mission that ends with a landing, and not by force: what flew went on from
+    every waypoint."""
     way, modes = mission.shared(requested_mission), modes_in_force(mission)
+    changes = flight_of(mission).arm_changes
+    is_forced = any(one.is_forced and mission.start_s <= one.time_s <= mission.end_s for one in changes)
     return (
-        mission.ended and not isinstance(way, Unavailable) and way.ending != "open"
+        mission.ended and not is_forced and not isinstance(way, Unavailable) and way.ending != "open"
         and bool(modes) and modes[-1].way == "mission"
     )  # fmt: skip
 
