@@ -239,6 +239,7 @@ def test_what_turns_over_and_does_not_fall_lies_on_what_it_hit(falls: bool, is_c
     made.table["ATT"]["Roll"][lost], made.table["ATT"]["Pitch"][lost] = -85.0 * grow, 40.0 * grow
     made.table["RCOU"]["C2"][made.after(50.0, 52.0)] = 1950.0
     made.table["RCOU"]["C1"][made.after(50.0, 52.0)] = 1100.0
+    made.table["GPS"]["Spd"][lost] *= falls
     if falls:
         for name, field in HEIGHTS:
             made.table[name][field][lost] = np.clip(12.0 - 5.0 * (made.t[lost] - 50.0) ** 2, 0.0, None)
