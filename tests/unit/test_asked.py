@@ -118,6 +118,6 @@ def test_power_and_resistance_are_those_in_the_air() -> None:
     assert hover_power(flown, {}) == pytest.approx(11.5 * 31)
     assert internal_resistance(flown, {}) == pytest.approx(0.015)
     assert isinstance(hover_power(mission(TAKEOFF, bat=table_of(Volt=[12.0], Curr=[0.0])), {}), Unavailable)
-    del flown.tables["ARM"]
-    stood = Mission(Flight(TablesLog(dict(flown.tables), 100.0)), flown.tables, 0.0, 100.0, True, {})
+    tables = {name: table for name, table in flown.tables.items() if name != "ARM"}
+    stood = Mission(Flight(TablesLog(tables, 100.0)), tables, 0.0, 100.0, True, {})
     assert hover_power(stood, {}) == NEVER_ARMED, "what it takes on the ground is no flight"

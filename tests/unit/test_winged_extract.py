@@ -13,6 +13,7 @@ from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
 from care_core.ecosystems.ardupilot.measures.shortfall import short_of
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
 from care_core.logs.base import Table
+from care_core.records import replace
 from care_core.run import Unavailable, Value
 from tests.tables import read
 
@@ -238,8 +239,7 @@ def returning(*landing: tuple[int, float, float, float], **settings: float) -> M
         for k, (c, n, e, up) in enumerate([(16, 0.0, 0.0, 0.0), *items])
     ]
     flight = mission(CMD=table(rows, "CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame"))
-    flight.settings.update(settings)
-    return flight
+    return replace(flight, settings={**flight.settings, **settings})
 
 
 SEQUENCE = ((189, 0.0, 0.0, 0.0), (16, -600.0, 0.0, 60.0), (16, -300.0, 0.0, 30.0), (21, 0.0, 0.0, 0.0))
