@@ -43,7 +43,9 @@ _SLOW = LIMITS.add(
 _SLOW_S = LIMITS.add("shortest time so slow", 2.0, "s", "a choice: a gust is over sooner")
 _SINKS_MS = LIMITS.add("sink of a stall", 3.0, "m/s", "a choice: TECS_SINK_MIN is 2 as shipped")
 _FAILED_P = LIMITS.add("probability of a sensor that was given up", 0.9, "", "the firmware's own word")
-_LOST_P = LIMITS.add("probability that it costs the mission", 0.2, "", "0 of 3 training flights: it flies on without")
+LOST_P = LIMITS.add(
+    "probability that it costs the mission", 0.3, "", "3 of 10 simulated flights: what is estimated in its place is off"
+)
 _STALLS_P = LIMITS.add("probability of a part, in a stall", 0.3, "", "a choice: speeds and gains make it stall as well")
 _HIGH_M = 15.0
 SENSOR_FAILED, SENSOR_SILENT = "the airspeed sensor failed", "the airspeed sensor reads nothing in the air"
@@ -97,7 +99,7 @@ def _silent(flight: Flight, span: Span) -> Finding:
         ),
         source="ARSP.Airspeed or VFR_HUD.airspeed against GPS.Spd",
         probability=_FAILED_P,
-        mission_lost=_LOST_P,
+        mission_lost=LOST_P,
     )
 
 
@@ -127,7 +129,7 @@ def _given_up(flight: Flight, sensor: Table, moved: Table) -> Iterator[Finding]:
         ),
         source="ARSP.Airspeed, U, H against GPS.Spd",
         probability=_FAILED_P,
-        mission_lost=_LOST_P,
+        mission_lost=LOST_P,
     )
 
 
@@ -145,7 +147,7 @@ def _said_to_fail(flight: Flight) -> Iterator[Finding]:
             evidence=f"the firmware says: {said[0][1]}{often}",
             source="MSG; AP_Airspeed_Health.cpp",
             probability=_FAILED_P,
-            mission_lost=_LOST_P,
+            mission_lost=LOST_P,
         )
 
 
