@@ -301,3 +301,9 @@ def test_what_was_disarmed_by_force_did_not_go_on_from_its_waypoints(forced: int
     silent = said.where(said.t < 80.0)
     arm = table([(5.0, 1, 0), (130.0, 0, forced)], "ArmState", "Forced")
     assert mission(MSG=silent, ARM=arm).shared(analyse).reached == reached
+
+
+def test_a_return_that_goes_on_with_a_landing_ends_where_that_is() -> None:
+    elsewhere = (*SEQUENCE[:-1], (21, 250.0, 100.0, 0.0))
+    assert returning(*elsewhere, RTL_AUTOLAND=1).shared(analyse).end == pytest.approx((250.0, 100.0), abs=0.1)
+    assert returning(*elsewhere, RTL_AUTOLAND=0).shared(analyse).end == pytest.approx((0.0, 0.0), abs=0.1)

@@ -25,6 +25,7 @@ from care_core.ecosystems.ardupilot.measures.requested import (
     requested_mission,
 )
 from care_core.ecosystems.ardupilot.measures.samples import samples
+from care_core.ecosystems.ardupilot.measures.whole_way import whole_way
 from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.coverage import EXTREME, doubt
 from care_core.ecosystems.measures import Mission, has
@@ -147,6 +148,9 @@ def analyse(mission: Mission) -> FlownMission:
         started.setdefault(numbers[0], drive.start_s)  # named once, before the vehicle may move
     route = np.array([offset_m(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
     corners, end = _way(mission.shared(requested_mission))
+    way = mission.shared(whole_way)
+    if flight_of(mission).is_winged and not isinstance(way, Unavailable) and way.back:
+        end = way.back[-1].north, way.back[-1].east  # a return goes on with the landing of its mission
     places = dict(zip(numbers, route, strict=True)) if len(route) else dict.fromkeys(numbers)
     passed = _passed(mission, track, places, started, reached, lands=drive is None)
     return FlownMission(
