@@ -55,6 +55,7 @@ PASSED_M = 5.0
 """As near to a waypoint it was there: copters and rovers count one as reached within 2 m unless told otherwise."""
 
 _SAYS, _AT_ONCE_S = (3, 3), 0.5
+"""The first ArduCopter whose log holds what it says of its items; items written so closely are a whole mission."""
 _HOMEWARD = (RETURN, LAND)
 _LEADING = frozenset((*PLACES, *_HOMEWARD))
 """Items that lead somewhere."""
@@ -150,7 +151,7 @@ def analyse(mission: Mission) -> FlownMission:
     corners, end = _way(mission.shared(requested_mission))
     way = mission.shared(whole_way)
     if flight_of(mission).is_winged and not isinstance(way, Unavailable) and way.back:
-        end = way.back[-1].north, way.back[-1].east  # a return goes on with the landing of its mission
+        end = way.back[-1][:2]  # a return goes on with the landing of its mission
     places = dict(zip(numbers, route, strict=True)) if len(route) else dict.fromkeys(numbers)
     passed = _passed(mission, track, places, started, reached, lands=drive is None)
     return FlownMission(

@@ -29,15 +29,8 @@ _RETURN_M = 100.0
 """RTL_ALTITUDE as shipped."""
 
 
-class Place(Record):
-    """A place that the way leads to: north and east of home and above it, in metres."""
-
-    north: float
-    east: float
-    height: float
-
-    def from_(self, other: Place) -> float:
-        return math.hypot(self.north - other.north, self.east - other.east)
+Place = tuple[float, float, float]
+"""North and east of home and above it, in metres."""
 
 
 class Way(Record):
@@ -50,7 +43,7 @@ class Way(Record):
     @property
     def climbs(self) -> float:
         way = (*self.out, *self.back[1:])
-        return sum(max(b.height - a.height, 0.0) for a, b in pairwise(way))
+        return sum(max(b[2] - a[2], 0.0) for a, b in pairwise(way))
 
 
 def whole_way(mission: Mission) -> Way | Unavailable:
@@ -64,7 +57,7 @@ def whole_way(mission: Mission) -> Way | Unavailable:
         return Unavailable("the log does not say where home is", "record ORGN or POS")
     items = list(followed(held.items))
     returns = next((at for at, item in enumerate(items) if item.command == RETURN), len(items))
-    out = (Place(0.0, 0.0, 0.0), *_places(items[:returns], home))
+    out = ((0.0, 0.0, 0.0), *_places(items[:returns], home))
     ends = any(item.command == LAND for item in items[:returns])
     return Way(out) if ends or returns == len(items) else Way(out, (out[-1], *_home_and_down(mission, items, home)))
 
@@ -77,9 +70,9 @@ def _places(items: Sequence[Item], home: Sequence[float]) -> Iterator[Place]:
             at = (*at[:2], item.alt_m)
         elif item.command in PLACES:
             at = place_of(item, home, at)
-            yield Place(*at)
+            yield at
         elif item.command == LAND:
-            yield Place(*(offset_m(home, item.lat, item.lng) if item.lat or item.lng else at[:2]), 0.0)
+            yield (*(offset_m(home, item.lat, item.lng) if item.lat or item.lng else at[:2]), 0.0)
             return
 
 
@@ -88,13 +81,13 @@ def _home_and_down(mission: Mission, items: Sequence[Item], home: Sequence[float
     lands = number_set(mission, "RTL_AUTOLAND", _ONLY_RETURNS)
     start = next((at for at, item in enumerate(items) if item.command == LAND_START), None)
     if start is None or lands in (_ONLY_RETURNS, _BY_HOME):
-        yield Place(0.0, 0.0, number_set(mission, "RTL_ALTITUDE", _RETURN_M))
+        yield 0.0, 0.0, number_set(mission, "RTL_ALTITUDE", _RETURN_M)
     if start is not None and lands != _ONLY_RETURNS:
         yield from _places(items[start + 1 :], home)
 
 
 def _length(way: Sequence[Place]) -> float:
-    return sum(b.from_(a) for a, b in pairwise(way))
+    return sum(math.dist(a[:2], b[:2]) for a, b in pairwise(way))
 
 
 _WAY: Mapping[str, Callable[[Way], float]] = {
