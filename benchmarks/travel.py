@@ -23,10 +23,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
 from benchmarks.peers import PlainClassifier
+from care_core.causal.all_objectives import AllObjectives
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Training
 from care_core.diagnose.judging import Judged, query_of, read_and_judge
@@ -87,6 +89,9 @@ class LeftOut(NamedTuple):
     """Logarithm of what the reference flight took over what was said that it needs."""
     need_inside: dict[str, Floats]
     predicted: Floats
+    """Product of what is expected of each objective."""
+    promised: Floats
+    """What a profile makes of that product, by the runs of the other parts."""
     plain: Floats
 
 
@@ -104,15 +109,26 @@ def left_out(frame: pd.DataFrame, schema: Schema, folds: int) -> LeftOut:
     def by_name(of: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
         return {name: joined([one[name] for one in of]) for name in measured(schema)}
 
+    predicted = joined([p.predicted for p in parts])
     return LeftOut(
         distance=joined([p.distance for p in parts]),
         error=by_name([p.error for p in parts]),
         inside=by_name([p.inside for p in parts]),
         need_error=by_name([p.need_error for p in parts]),
         need_inside=by_name([p.need_inside for p in parts]),
-        predicted=joined([p.predicted for p in parts]),
+        predicted=predicted,
+        promised=_promised(predicted, all_met(frame, schema), fold),
         plain=joined([p.plain for p in parts]),
     )
+
+
+def _promised(predicted: Floats, truth: Floats, fold: NDArray[np.int64]) -> Floats:
+    made = np.empty_like(predicted)
+    for part in np.unique(fold):
+        others = fold != part
+        curve = reliability(predicted[others], truth[others])
+        made[~others] = AllObjectives.of(curve).of_product(predicted[~others])
+    return made
 
 
 def _predict(frame: pd.DataFrame, schema: Schema, test: Bools) -> LeftOut:
@@ -149,6 +165,7 @@ def _asked(
         need_error=need_error,
         need_inside=need_inside,
         predicted=np.full(n, np.nan),
+        promised=np.full(n, np.nan),
         plain=np.full(n, np.nan),
     )
     reference = {v.name: v.default for v in schema.options if v.default is not None}
@@ -190,7 +207,7 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
     truth = all_met(frame, schema)
     print(f"missions left out whole: {len(frame)} runs")
     print(
-        "  runs at a distance of    time: rms  in 80 %   energy: rms  in 80 %   all met: ECE   Brier  plain ECE  Brier"
+        "  runs at a distance of    time: rms  in 80 %   energy: rms  in 80 %   all met: ECE   Brier  promised ECE  Brier  plain ECE  Brier"
     )
     bounds = (0.0, *FAR, np.inf)
     for low, high in ((0.0, np.inf), *pairwise(bounds)):
@@ -203,7 +220,7 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
             cells.append(
                 f"{np.sqrt(np.mean(found.error[name][known] ** 2)):9.1%} {found.inside[name][known].mean():8.0%}"
             )
-        for predicted in (found.predicted, found.plain):
+        for predicted in (found.predicted, found.promised, found.plain):
             brier = float(((predicted[part] - truth[part]) ** 2).mean())
             cells.append(f"{calibration_error(predicted[part], truth[part]):9.3f} {brier:7.3f}")
         print(f"  {low:4.1f} to {high:4.1f} ({part.sum():4d})    {'    '.join(cells)}")
@@ -212,9 +229,10 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
         error = found.need_error[name][known]
         print(f"  what the reference needs, {name}: rms {np.sqrt(np.mean(error**2)):.1%}, "
               f"in its 80 % interval {found.need_inside[name][known].mean():.0%}, n {known.sum()}")  # fmt: skip
-    print("    predicted  met    n")
-    for p, seen, count in reliability(found.predicted, truth):
-        print(f"    {p:9.2f} {seen:4.2f} {count:4d}")
+    for name, predicted in (("predicted", found.predicted), ("promised", found.promised)):
+        print(f"    {name:9}  met    n")
+        for p, seen, count in reliability(predicted, truth):
+            print(f"    {p:9.2f} {seen:4.2f} {count:4d}")
 
 
 # --- faults whose resets were flown -----------------------------------------------------------------------------

@@ -395,3 +395,15 @@ def test_an_elevator_that_is_up_while_the_nose_stays_down(pitch: float, is_told:
     made.table["PIDP"]["Tar"][runs], made.table["PIDP"]["Act"][runs] = 60.0, made.noise(0.5)[runs]
     titles = [one.title for one in every_finding(made.find())]
     assert ("the elevator is up, and the nose stays down" in titles) == is_told
+
+
+@pytest.mark.parametrize(("gusts", "is_struck"), [(18.0, False), (2.0, True)], ids=["in gusts", "in calm air"])
+def test_gusts_on_wings_are_no_blow_before_control_is_lost(gusts: float, is_struck: bool) -> None:
+    made = MadePlane()
+    for name in ("IMU", "IMU#2"):
+        made.table[name]["AccZ"] += gusts * np.sin(2 * np.pi * made.t / 0.7) * (made.t > 30.0)
+        made.table[name]["AccZ"][made.after(49.9, 50.05)] = -38.0
+    made.table["ATT"]["Roll"] -= 100.0 * np.clip(made.t - 50.0, 0.0, None) * (made.t < DOWN_S)
+    flight = made.flight()
+    assert flight.lost_control_s == pytest.approx(50.3, abs=0.5)
+    assert (flight.struck_s is not None) is is_struck

@@ -382,12 +382,11 @@ class Airborne(Armed):
         table = self.one("IMU", "AccX", "AccY", "AccZ")
         if table is None or not flies(self.kind):
             return
-        t, felt = table.t, np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
+        t, felt = table.t, _magnitude(table)
         for at in t[(felt > _SHOCK) & during(self.armed, t)].tolist():
-            blow = float(np.max(felt[(t >= at) & (t <= at + _STRUCK_S)]))
-            usual = felt[(t >= at - _REST_S) & (t < at - _SWAYS_S)]
-            if len(usual) and blow <= _BLOW * float(np.max(usual)):
+            if not self._stands_out(at):
                 continue
+            blow = float(np.max(felt[(t >= at) & (t <= at + _STRUCK_S)]))
             fell, flew = self._fell_ms(at), self._flew_ms(at)
             after = felt[(t > at + _REST_S / 2) & (t < at + _REST_S)]
             is_still = len(after) > 2 and float(np.ptp(after)) < _STILL
@@ -437,7 +436,7 @@ class Airborne(Armed):
         table, height, moved = self.one("IMU", "AccX", "AccY", "AccZ"), self.height, self.one("GPS", "Spd")
         if table is None or height is None or moved is None or not self.is_winged:
             return None
-        t, felt = table.t, np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
+        t, felt = table.t, _magnitude(table)
         for at, _ in runs(t, (felt > _GRAZES) & during(self.airborne, t), gap_s=_STRUCK_S):
             before, after = self._flew_ms(at), moved["Spd"][(moved.t > at) & (moved.t < at + _STRUCK_S)]
             from_above = float(np.max(height[1][(height[0] > at - _HIT_LOST_S) & (height[0] < at)], initial=0.0))
@@ -523,8 +522,13 @@ class Airborne(Armed):
         table = self.one("IMU", "AccX", "AccY", "AccZ")
         if table is None:
             return None
-        hit = (np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2) > _SHOCK) & (table.t >= first)
-        return float(table.t[hit][0]) if hit.any() else None
+        shaken = table.t[(_magnitude(table) > _SHOCK) & (table.t >= first)].tolist()
+        return next((t for t in shaken if not self.is_winged or self._stands_out(t) and self._ends_flight(t)), None)
+
+    def _ends_flight(self, at: float) -> bool:
+        """Whether a blow may be the end of a plane's flight: it came low, or on a hill where the plane rests since."""
+        is_low = self.height is None or float(np.interp(at, *self.height)) < _CLIMBS_M
+        return is_low or self._rests_after(at)
 
     def _ground_after(self, first: float) -> float | None:
         known = self.height
@@ -550,11 +554,21 @@ class Airborne(Armed):
         if lost is None:
             return None
         before = [(t, felt) for t, felt in self._blows() if lost - _HIT_LOST_S < t < lost and not self._was_going(t)]
-        just_before = (t for t, felt in before if felt > _SHOCK and t >= lost - _STRUCK_S)
+        just_before = (t for t, felt in before if felt > _SHOCK and t >= lost - _STRUCK_S and self._stands_out(t))
         flown = [(t, felt) for t, felt in before if within(self.airborne, t)]
         moved = self.one("GPS", "Spd")
         hard = (t for t, felt in flown if felt > _HARD * _SHOCK or _stops_at(moved, t))
         return min((*hard, *just_before, *_out_of_the_blue(flown)), default=None)
+
+    def _stands_out(self, at: float) -> bool:
+        """Whether nothing that was felt until shortly before comes near a blow, as gusts on wings do."""
+        table = self.one("IMU", "AccX", "AccY", "AccZ")
+        if table is None:
+            return False
+        t, felt = table.t, _magnitude(table)
+        blow = float(np.max(felt[(t >= at) & (t <= at + _STRUCK_S)]))
+        usual = felt[(t >= at - _REST_S) & (t < at - _SWAYS_S)]
+        return not len(usual) or blow > _BLOW * float(np.max(usual))
 
     def _was_going(self, at: float) -> bool:
         """Whether it was off its attitude demand already as it was struck: then it fell on what struck it."""
@@ -595,7 +609,7 @@ class Airborne(Armed):
         told is that a sensor clipped, which vibration does as well."""
         table = self.one("IMU", "AccX", "AccY", "AccZ")
         if table is not None:
-            felt = np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
+            felt = _magnitude(table)
             shaken = felt > _SHOCK
             yield from zip(table.t[shaken].tolist(), felt[shaken].tolist(), strict=True)
         for one in self.all("VIBE", "Clip"):
@@ -627,6 +641,10 @@ def _after(series: tuple[Floats, Floats] | None, at: float) -> Floats:
         return np.empty(0)
     t, values = series
     return values[(t > at + _BEFORE_HIT_S) & (t < at + _REST_S)]
+
+
+def _magnitude(accelerations: Table) -> Floats:
+    return np.asarray(np.sqrt(accelerations["AccX"] ** 2 + accelerations["AccY"] ** 2 + accelerations["AccZ"] ** 2))
 
 
 def _off_demand(part: Table) -> Floats:
