@@ -22,6 +22,11 @@ UNREADABLE_MAGIC = (
     (b"\x1f\x8b", "a gzip archive", "Unpack it first."),
     (b"PK\x03\x04", "a zip archive", "Unpack it first."),
     (_ZSTD_MAGIC, "a zstd archive", "Unpack it first."),
+    (
+        b"\x89MCAP0\n",
+        "an MCAP recording whose line ends were changed on its way",
+        "Copy it once more as binary: git or FTP took it for text.",
+    ),
 )
 """Formats that are recognised but not read: how the file begins, what it is, what to do."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from care_core.ecosystems.ardupilot.measures.events import fall_of
 from care_core.ecosystems.findings import LEANED, STRUCK, every_finding
 from care_core.ecosystems.measures import Mission, find_extractor
 from tests.flights import ARMED_S, DOWN_S, END_S, FAILS_S, HOVER, UP_S, Made, falling, first
@@ -155,9 +156,78 @@ def test_a_tip_over_at_take_off() -> None:
     made = Made()
     made.table["POS"]["RelHomeAlt"][:] = 0.1
     made.table["CTUN"]["Alt"][:] = made.table["CTUN"]["BAlt"][:] = 0.1 + made.noise(0.05)
-    made.table["ATT"]["Roll"][made.after(UP_S + 1)] = 85.0
+    over = made.after(UP_S + 1)
+    made.table["ATT"]["Roll"][over] = 85.0
+    made.table["IMU"]["AccY"][over], made.table["IMU"]["AccZ"][over] = -9.8, 0.0
     made.rows["ERR"] = [(UP_S + 4, {"Subsys": 12.0, "ECode": 1.0})]
     assert first(made).kind == "takeoff"
+
+
+def on_the_ground(made: Made) -> None:
+    for table, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt")):
+        made.table[table][field][:] = 0.1 + made.noise(0.05)
+
+
+def test_an_attitude_that_goes_over_while_nothing_is_felt_is_no_tip_over() -> None:
+    made = Made()
+    on_the_ground(made)
+    made.table["ATT"]["Roll"][made.after(UP_S + 1)] = 85.0
+    made.rows["ERR"] = [(UP_S + 4, {"Subsys": 12.0, "ECode": 1.0})]
+    assert "takeoff" not in {one.kind for one in every_finding(made.find())}
+
+
+@pytest.mark.parametrize(("leans_deg", "is_lost"), [(4.0, False), (25.0, True)])
+def test_what_is_held_down_and_told_to_lean_has_lost_no_control(leans_deg: float, is_lost: bool) -> None:
+    made = Made()
+    on_the_ground(made)
+    told = made.after(UP_S + 1, UP_S + 8)
+    made.table["ATT"]["DesRoll"][told] = -45.0
+    made.table["ATT"]["Roll"][told] = leans_deg
+    made.table["IMU"]["AccX"] += made.noise(3.0)  # its motors shake it
+    assert (made.flight().lost_control_s is not None) == is_lost
+
+
+@pytest.mark.parametrize(("throttle", "is_told"), [(0.0, True), (HOVER, False)], ids=["cut", "swinging in the air"])
+def test_a_copter_that_lies_tilted_when_it_has_landed_turned_over(throttle: float, is_told: bool) -> None:
+    made = Made()
+    lies = made.after(DOWN_S)
+    made.table["CTUN"]["ThO"][lies] = made.table["CTUN"]["ThI"][lies] = throttle
+    made.table["ATT"]["Pitch"][lies], made.table["ATT"]["DesPitch"][lies] = -46.0, -46.0
+    assert (made.flight().lost_control_s is not None) == is_told
+
+
+def test_what_leans_as_it_is_told_flies_whatever_its_height_is_said_to_be() -> None:
+    made = Made()
+    for table, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[table][field] = -0.01 * made.t + made.noise(0.05)
+    assert not made.flight().airborne
+    lean = np.where(made.after(UP_S, DOWN_S), 12.0 * np.sin(made.t), 0.0)
+    for field in ("Roll", "DesRoll"):
+        made.table["ATT"][field] += lean
+    assert sum(end - start for start, end in made.flight().airborne) > 0.8 * (DOWN_S - UP_S)
+
+
+@pytest.mark.parametrize(("fell_ms", "said"), [(13.0, "it was falling at 13 m/s as the log ends"), (5.5, "")])
+def test_a_fall_at_the_end_of_a_log_is_a_crash_where_no_copter_is_told_to_come_down_so(
+    fell_ms: float, said: str
+) -> None:
+    made = Made()
+    before = np.clip(made.t - (END_S - 4.0), 0.0, None)
+    for table, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt")):
+        made.table[table][field] = 80.0 - fell_ms * before
+    made.table["CTUN"]["ThO"][:] = HOVER
+    made.rows["ARM"] = made.rows["ARM"][:1]
+    assert fall_of(Mission(made.flight(), {}, ARMED_S, END_S, False, {}, {})) == said
+
+
+@pytest.mark.parametrize(("turns_deg_s", "is_told"), [(570.0, True), (100.0, False)])
+def test_a_blow_that_a_sensor_clips_at_and_that_whirls_it_is_what_it_hit(turns_deg_s: float, is_told: bool) -> None:
+    made = Made()
+    made.table["ATT"]["Roll"][made.after(FAILS_S, FAILS_S + 0.6)] = 50.0
+    made.table["IMU"]["GyrX"][made.after(FAILS_S - 0.2, FAILS_S)] = np.radians(turns_deg_s)
+    for name in ("VIBE", "VIBE#2"):
+        made.table[name]["Clip"] = np.where(made.t > FAILS_S - 0.2, 1.0, 0.0)
+    assert (STRUCK in {one.title for one in every_finding(made.find())}) == is_told
 
 
 @pytest.mark.parametrize(("mode", "suspect"), [(1.0, "operation"), (0.0, "hardware")])

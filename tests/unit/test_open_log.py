@@ -24,6 +24,7 @@ from care_core.logs.opening import open_log, sniff
         (b"ULog\x01\x12\x35" + b"\0" * 80, "no message"),
         (b"\x1f\x8b\x08" + b"\0" * 80, "gzip"),
         (b"PK\x03\x04" + b"\0" * 80, "zip"),
+        (b"\x89MCAP0\n" + b"\0" * 80, "line ends were changed"),
         (b"#ROSBAG V1.2\n" + b"\0" * 80, "format 1.x"),
         (b"#ROSRECORD V1.2\n" + b"\0" * 80, "format 1.x"),
         (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n", "no message"),

@@ -327,6 +327,15 @@ def test_a_failsafe_that_the_heartbeat_tells_of_is_one(said_s: float, said: str,
     assert checked.otherwise == named
 
 
+@pytest.mark.parametrize(
+    ("over_s", "named"), [(9.0, "EKF failsafe at 11.0 s"), (None, "it was armed with an EKF failsafe on")]
+)
+def test_a_failsafe_that_had_passed_at_arming_began_anew(over_s: float | None, named: str) -> None:
+    records = [(3.0, 17.0, 1.0), *([] if over_s is None else [(over_s, 17.0, 0.0)]), (11.0, 17.0, 1.0)]
+    mission = flown(mode=5, ERR=table(records, "Subsys", "ECode"))
+    assert {check.name: check for check in KIND.checks(mission)}["no_failsafe"].otherwise == named
+
+
 def test_a_failsafe_that_ends_as_it_is_armed_did_nothing() -> None:
     beats = table([(float(t), float(10 <= t < 70), 5.0 if t < 12 else 4.0) for t in range(75)], "Armed", "State")
     assert checks(flown(mode=5, STAT=beats))["no_failsafe"] == 1.0

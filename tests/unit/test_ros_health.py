@@ -283,6 +283,15 @@ def test_recordings_that_tell_of_no_robot_say_so(tmp_path: Path) -> None:
     assert health.too_little.startswith("it holds inertial data, and nothing that tells how a robot did: no odometry")
 
 
+def test_types_that_are_not_read_are_named(tmp_path: Path) -> None:
+    kind = "std_msgs/msg/Float32"
+    depths = [("/depth", kind, START_NS + n * SECOND_NS, make(ROS2, kind, float(n))) for n in range(20)]
+    health = ECOSYSTEM.examine(run_model(open_log(write_db3(tmp_path / "floats", messages=depths))))
+    assert health.too_little.startswith(
+        "it holds std_msgs/Float32, which is not read, and nothing that tells how a robot did"
+    )
+
+
 def test_a_battery_that_says_nothing_plausible_is_not_said_to_be_missing(tmp_path: Path) -> None:
     messages = [
         (topic, kind, START_NS + round(t * 1e9), message)

@@ -55,6 +55,8 @@ _CARRIES = 0.25
 """Throttle above which a copter flies where nothing tells its height: a light one hovers at it, idling is below."""
 _DIPS_S, _HOPS_S = 3.0, 1.0
 """A flight goes on over so short a dip of height or throttle, and is longer than a hop."""
+_LEANS_DEG = 8.0
+"""More than a slope to start on."""
 OFF_GROUND_M = 1.0
 """Height above which a copter touches nothing, whatever its legs."""
 _RISES_S, _RISES_M = 0.5, 0.5
@@ -86,11 +88,13 @@ _GRAZES, _GRAZED = 100.0, 0.7
 """m/s^2: a belly landing is as hard at most; and the share of its speed that what touches nothing keeps."""
 _FAST_MS, _STILL = 5.0, 2.0
 """A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
+_STILL_S, _FEWEST = 3.0, 5
+"""What nothing moves so long after its attitude is said to be lost stands, told by so many messages at least."""
 _SIMULATED_HIT = re.compile(r"(?:SIM )?Hit ground at (\d+(?:\.\d+)?) m/s")
 """Simulators before firmware 4.1 said it without their name."""
-_BEFORE_OVER_S, _ON_SIDE_DEG = 3.0, 50.0
+_BEFORE_OVER_S, _ON_SIDE_DEG, _TILTED_DEG = 3.0, 50.0, 40.0
 """Motors that worked so shortly before a copter lay on its back or its side turned it over, or let it fall; no ground
-that a copter stands on is so steep."""
+that a copter stands on is so steep, nor, with its throttle cut, at this."""
 _LIES_S, _TURNS = 3.0, 0.02
 """A flip is over sooner; above this throttle motors do more than idle, however light the vehicle."""
 _FLEW_S = 5.0
@@ -142,10 +146,23 @@ class Airborne(Armed):
             up &= throttle[1] > _TURNS
             if height is None:
                 up |= throttle[1] > _CARRIES
+            up |= during(self.leans_as_told, t) & (throttle[1] > _CARRIES)
         spans: list[Span] = []
         for start, end in self.armed:
             spans += runs(t, up & (t >= start) & (t <= end), gap_s=_DIPS_S)
         return tuple((a, b) for a, b in spans if b - a >= _HOPS_S)
+
+    @cached_property
+    def leans_as_told(self) -> tuple[Span, ...]:
+        """When a copter leant as it was told to, to and fro: on the ground it cannot, whatever its height is said to
+        be. None of it where that was for moments alone."""
+        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+        if table is None or not self.is_copter:
+            return ()
+        told, off = np.hypot(table["DesRoll"], table["DesPitch"]), np.concatenate([*map(_off_demand, parts(table))])
+        follows = (told > _LEANS_DEG) & (off < _LEANS_DEG / 2) & during(self.armed, table.t)
+        spans = tuple(runs(table.t, follows, gap_s=_FLICK_S))
+        return spans if sum(end - start for start, end in spans) > _BACK_S else ()
 
     @property
     def _on_wings(self) -> tuple[Span, ...]:
@@ -222,13 +239,14 @@ class Airborne(Armed):
             return None
         t, error = off_demand
         off = (error > _OUT_OF_CONTROL_DEG) | (leans[1] > _OVER_DEG)
-        matters = during(((start - 1.0, end) for start, end in up), t) | during(self._lifting_off, t)
+        leant = leans[1] > FOLLOWED_DEG  # what is held down, or idles on its legs, is told to lean and does not
+        matters = during(((start - 1.0, end) for start, end in up), t) | (during(self._lifting_off, t) & leant)
         flying = during(up, t)
         held = (error < FOLLOWED_DEG) & flying
         back = runs(t, held, gap_s=_FLICK_S)
         height = self.height
         for start, end in runs(t, off & matters & self._is_driven(t)):
-            if self._reaches_after(start + _BACK_S):
+            if self._reaches_after(start + _BACK_S) or self.stands_still(start):
                 continue
             fell_s = self._fell_from(start, height)
             until = start + _CRASH_CHECK_S if fell_s is None else fell_s
@@ -242,6 +260,18 @@ class Airborne(Armed):
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
         return min((t for t in (self._overturned_s, self._spun_s) if t is not None), default=None)
+
+    def stands_still(self, at: float) -> bool:
+        """Whether accelerometers and barometer feel nothing, near the ground, of what its attitude or its demand tells:
+        it is held, or its gyros turn by themselves."""
+        felt, height = self.one("IMU", "AccX", "AccY", "AccZ"), self.barometer
+        if felt is None or height is None:
+            return False
+        now, then = ((t > at - _STRUCK_S) & (t < at + _STILL_S) for t in (felt.t, height[0]))
+        if now.sum() < _FEWEST or then.sum() < _FEWEST or float(median(height[1][then])) > _LOW_M:
+            return False
+        axes = (felt["AccX"], felt["AccY"], felt["AccZ"])
+        return max(float(np.ptp(one[now])) for one in axes) < _STILL and float(np.ptp(height[1][then])) < _REST_M
 
     @property
     def _lifting_off(self) -> Iterator[Span]:
@@ -263,8 +293,17 @@ class Airborne(Armed):
         if on_back is not None:
             return on_back
         on_side = self._lay_s(_ON_SIDE_DEG)
+        if on_side is None:
+            on_side = self._lay_s(_TILTED_DEG)
+            if on_side is not None and not self._is_cut(on_side):
+                return None
         flew = on_side is not None and any(a <= on_side <= b + _FLEW_S for a, b in self.airborne)
         return on_side if flew else None
+
+    def _is_cut(self, since: float) -> bool:
+        """Whether its throttle lifts nothing from a time on."""
+        after = None if self.throttle is None else self.throttle[1][self.throttle[0] > since + _FLICK_S]
+        return after is not None and len(after) > 0 and float(median(after)) < _LIFTING
 
     def _lay_s(self, lean_deg: float) -> float | None:
         """Since when it leaned by more than this, to the end, if its motors had just worked."""
@@ -421,13 +460,25 @@ class Airborne(Armed):
     def _bumped(self) -> Hit | None:
         """A blow out of the blue, in the air, that threw a copter off its attitude demand, which it had followed."""
         hard = [(t, felt) for t, felt in self._blows() if not felt or felt > 2 * _SHOCK]
-        for at in _out_of_the_blue([one for one in hard if within(self.airborne, one[0])]):
+        flown = [one for one in hard if within(self.airborne, one[0])]
+        clipped = (t for t, felt in flown if not felt and _is_first(t, flown) and self._whirls(t))
+        for at in sorted({*_out_of_the_blue(flown), *clipped}):
             thrown = any(at - _FLICK_S < t < at + _FLICK_S for t in self.left_demand)
             if thrown and not self._was_going(at - _SAME_BLOW_S):
-                blow = max(felt for t, felt in hard if at <= t < at + _STRUCK_S)
-                said = f"a blow of {blow:.0f} m/s^2 threw it off its attitude; it came back, and flew on"
+                felt = max(felt for t, felt in hard if at <= t < at + _STRUCK_S)
+                blow = f"a blow of {felt:.0f} m/s^2" if felt else "a blow that a sensor clipped at"
+                said = f"{blow} threw it off its attitude; it came back, and flew on"
                 return Hit(at, self._flew_ms(at), said, "something")
         return None
+
+    def _whirls(self, at: float) -> bool:
+        """Whether its gyros say that it was turned faster than it turns by itself in a mode that keeps it level."""
+        table = self.one("IMU", "GyrX", "GyrY", "GyrZ")
+        if table is None:
+            return False
+        now = (table.t > at - _FLICK_S) & (table.t < at + _FLICK_S)
+        turns = (np.max(np.abs(table[name][now]), initial=0.0) for name in ("GyrX", "GyrY", "GyrZ"))
+        return bool(np.degrees(max(turns)) > _SPINS_DEG_S)
 
     @cached_property
     def _grazed(self) -> Hit | None:
@@ -523,7 +574,7 @@ class Airborne(Armed):
         if table is None:
             return None
         shaken = table.t[(_magnitude(table) > _SHOCK) & (table.t >= first)].tolist()
-        return next((t for t in shaken if not self.is_winged or self._stands_out(t) and self._ends_flight(t)), None)
+        return next((t for t in shaken if not self.is_winged or (self._stands_out(t) and self._ends_flight(t))), None)
 
     def _ends_flight(self, at: float) -> bool:
         """Whether a blow may be the end of a plane's flight: it came low, or on a hill where the plane rests since."""
@@ -621,9 +672,13 @@ def _out_of_the_blue(blows: Sequence[tuple[float, float]]) -> Iterator[float]:
     """Blows that were too much for a sensor after a while without any: what shakes itself does so again and again."""
     shocks, clipped = [t for t, felt in blows if felt > _SHOCK], [t for t, felt in blows if not felt]
     for at in shocks:
-        is_first = not any(at - _CALM_S < t < at - _SAME_BLOW_S for t, _ in blows)
-        if is_first and any(abs(t - at) < _SAME_BLOW_S for t in clipped):
+        if _is_first(at, blows) and any(abs(t - at) < _SAME_BLOW_S for t in clipped):
             yield at
+
+
+def _is_first(at: float, blows: Sequence[tuple[float, float]]) -> bool:
+    """Whether no other blow came for a while."""
+    return not any(at - _CALM_S < t < at - _SAME_BLOW_S for t, _ in blows)
 
 
 def _first_above(series: tuple[Floats, Floats] | None, least: float, start: float, end: float) -> float | None:

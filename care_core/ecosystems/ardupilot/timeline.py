@@ -14,8 +14,8 @@ from itertools import groupby, pairwise
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from care_core.ecosystems.ardupilot.aloft import ends_aloft
 from care_core.ecosystems.ardupilot.armed import ArmChange
-from care_core.ecosystems.ardupilot.checks.log import ends_aloft
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.heartbeat import shown_failsafes
 from care_core.ecosystems.ardupilot.recorded import Mode

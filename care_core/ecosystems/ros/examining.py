@@ -37,6 +37,8 @@ _STREAMS = {ODOMETRY: "odometry", **dict.fromkeys(COMMANDS, "commands"), SCAN: "
 """What counts where there is more than a little of it, and plausible."""
 _TELLING = ("odometry", "goals", "commands", "laser", "battery", "messages")
 """What tells how a robot did."""
+_FEW = 3
+"""Types of messages that are told by name."""
 _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 
 
@@ -99,5 +101,8 @@ def _nothing_of_a_robot(drive: Drive) -> str:
     if poor:
         lacks += f", and too little or nothing plausible of {listed(poor, 'and')}"
     if not labels:
-        return f"nothing in it tells of a robot: {lacks}"
+        kinds = sorted(there)
+        more = f" and {len(kinds) - _FEW} types more" if len(kinds) > _FEW else ""
+        unread = f"{', '.join(kinds[:_FEW])}{more}, which {'is' if len(kinds) == 1 else 'are'} not read"
+        return f"it holds {unread}, and nothing that tells how a robot did: {lacks}"
     return f"it holds {listed(labels, 'and')}, and nothing that tells how a robot did: {lacks}"

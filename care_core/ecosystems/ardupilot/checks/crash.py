@@ -51,8 +51,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         yield from _stranded(flight)
         yield from _survived(flight)
     elif _tipped(flight, lost if lost is not None else begin):
-        if wrong_layout(flight) is not None:
-            return  # that says why
+        if wrong_layout(flight) is not None or flight.stands_still(begin):
+            return  # the layout says why; or its attitude alone went over
         yield _tipped_over(flight, begin, told)
     elif told is not None or said is not None or impact is not None:
         first = min(t for t in (told, said, impact, flight.struck_s) if t is not None)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.aloft import ends_aloft
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import LOST_SIGHT, Finding
 from care_core.ecosystems.spans import Span, seconds_in
-from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, pauses
 
@@ -22,13 +21,6 @@ LIMITS = Limits()
 _HOLE_S = LIMITS.add("shortest hole", 2.0, "s", "a choice: a busy card may keep a logger waiting for a second")
 _TIMES = LIMITS.add("shortest hole, in usual steps", 20.0, "", "a choice: of logs that are thinned")
 _SWITCHED_S = LIMITS.add("around arming and disarming", 1.0, "s", "a choice: loggers are opened and closed there")
-_HIGH_M = LIMITS.add("height of an end in the air", 2.0, "m", "a choice: more than any estimate drifts in a flight")
-_FALL_M, _FALLS_S = (
-    LIMITS.add("fall at an end in the air", 10.0, "m", "a choice: a landing sinks 2 m/s at most, and drift less"),
-    LIMITS.add("time of that fall", 2.0, "s", "a choice: longer than a step of the height as it touches down"),
-)
-_RECENT_S = LIMITS.add("age of a height of the end", 5.0, "s", "a choice: a height is recorded once a second")
-_LIFTING = LIMITS.add("throttle of an end in the air", 0.2, "", "a choice: armed motors idle below it")
 _FALLS_V = LIMITS.add(
     "fall of the board's supply", 0.3, "V", "ArduPilot, Power module and brown-outs: twice the swing that is normal"
 )
@@ -143,43 +135,6 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         source="EV, ARM, CTUN, POS, POWR",
         probability=_POWER_LOST_P if sagging else _ENDS_P,
     )
-
-
-class Aloft(NamedTuple):
-    """Where a log ends in the air."""
-
-    height_m: float
-    fell_m: float
-    """How far it came down in the last seconds."""
-
-    @property
-    def is_falling(self) -> bool:
-        return self.fell_m >= _FALL_M
-
-    def __str__(self) -> str:
-        """As it is told: "12 m up", or "falling at 9 m/s"."""
-        return f"falling at {self.fell_m / _FALLS_S:.0f} m/s" if self.is_falling else f"{self.height_m:.0f} m up"
-
-
-def ends_aloft(flight: Flight) -> Aloft | None:
-    """How high it is at the last record; None where it lies on the ground there, crashed, or nothing tells. A copter's
-    estimate that runs away is told by its barometer, and one whose motors lift nothing is up only where it falls."""
-    known = [flight.height, flight.barometer if flight.is_copter else None]
-    heights = [one for one in known if one is not None and len(one[0]) and one[0][-1] > flight.end_s - _RECENT_S]
-    if not flies(flight.kind) or not heights or flight.impact_s is not None:
-        return None
-    told = [Aloft(float(median(m[-3:])), _fell_m((t, m))) for t, m in heights]
-    aloft = told[-1] if told[0].height_m - told[-1].height_m > _HIGH_M / 2 else told[0]
-    throttle = flight.throttle if flight.is_copter else None
-    lifts = throttle is None or float(median(throttle[1][-3:])) > _LIFTING
-    return aloft if (aloft.height_m > _HIGH_M and lifts) or aloft.is_falling else None
-
-
-def _fell_m(height: tuple[Floats, Floats]) -> float:
-    """How far it came down in the last seconds of the log."""
-    t, known = height
-    before = known[(t <= t[-1] - _FALLS_S) & (t > t[-1] - 2 * _FALLS_S)]
-    return float(before[-1] - median(known[-3:])) if len(before) else 0.0
 
 
 def _supply_falls(flight: Flight) -> str:

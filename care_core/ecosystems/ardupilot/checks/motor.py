@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems import lost_motor
+from care_core.ecosystems.ardupilot.airborne import FOLLOWED_DEG
 from care_core.ecosystems.ardupilot.checks import bench
 from care_core.ecosystems.ardupilot.checks.thrust import climbs, saturated
 from care_core.ecosystems.ardupilot.flight import Flight
@@ -213,6 +214,8 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Bools:
         if throttle is not None and flight.is_copter:  # what lies with its motors down rights itself in vain
             lifting &= np.interp(t, *throttle) > _IDLES
         return lifting & during(flight.flown, t)
+    if (lean_error := flight.lean_error) is not None:  # what is held down is told to lean and does not
+        lifting &= np.interp(t, *lean_error) < FOLLOWED_DEG
     if throttle is not None:  # what idles winds up its integrators against the ground
         lifting &= np.interp(t, *throttle) > _TRIES
     return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting

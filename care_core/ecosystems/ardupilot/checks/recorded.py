@@ -19,7 +19,9 @@ def find(flight: Flight) -> Iterator[Finding]:
     for one in liveness.findings(flight.frozen):
         steers = one.kind == "airspeed" and flight.is_winged
         yield replace(one, mission_lost=LOST_P) if steers else one
-    yield from liveness.unconnected(sources.unconnected(flight, flight.hovering), flight.end_s)
+    failsafe = flight.battery_failsafe_s is not None  # whose finding says what its monitor measures
+    lacking = (one for one in sources.unconnected(flight, flight.hovering) if one.kind != "battery" or not failsafe)
+    yield from liveness.unconnected(lacking, flight.end_s)
     messages = dict.fromkeys(source.message for source in sources.SOURCES)
     recorded = {named(name): table.t for name in messages if (table := flight.one(name)) is not None}
     yield from liveness.recorded_in_part(recorded, flight.armed)

@@ -93,7 +93,7 @@ def _too_little(flight: Flight, full: list[Span], begin: float, before: float) -
     since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""
     evidence = f"throttle above {since}{100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
     evidence += f", {below:.1f} m below the height wanted" if below else ""
-    evidence += f"; {100 * before:.0f} % before that"
+    evidence += f"; until then it flew at {100 * before:.0f} %"
     severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
     return _finding(flight, "too little thrust", (begin, end), severity, evidence)
 
@@ -103,7 +103,7 @@ def _sinks(flight: Flight, sinking: list[Span], before: float) -> Finding:
     start, end = sinking[0][0], sinking[-1][1]
     evidence = (
         f"throttle above {100 * _NEARLY_FULL:.0f} % for {seconds_in(sinking):.0f} s from {log_time(start, 0)} on, and "
-        f"it sank by {_sank_m(flight, *sinking[0]):.1f} m at that; {100 * before:.0f} % before that"
+        f"it sank by {_sank_m(flight, *sinking[0]):.1f} m at that; until then it flew at {100 * before:.0f} %"
     )
     found = _finding(flight, "too little thrust", (start, end), "critical", evidence)
     return replace(found, probability=max(found.probability, _LACKS_P))

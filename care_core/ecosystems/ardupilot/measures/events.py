@@ -6,6 +6,7 @@ import math
 import re
 
 from care_core.ecosystems.ardupilot.airborne import Hit
+from care_core.ecosystems.ardupilot.aloft import FALLS_MS, ends_aloft
 from care_core.ecosystems.ardupilot.armed import ArmChange
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, SAID_AFTER_S, analyse
 from care_core.ecosystems.ardupilot.measures.modes import flight_of, is_armed
@@ -122,6 +123,19 @@ def crash_of(mission: Mission) -> str:
     if flight.impact_s is None or not mission.start_s <= flight.impact_s <= mission.end_s + SAID_AFTER_S:
         return ""
     return "it turned over" if flight.impact_s == flight.turned_over_s else "control was lost, and it came down"
+
+
+def fall_of(mission: Mission) -> str:
+    """What says that a vehicle without wings was falling out of control, or faster than any is told to, as its log
+    ended, in a clause; empty where nothing does."""
+    flight = flight_of(mission)
+    aloft = None if flight.is_winged or mission.ended else ends_aloft(flight.run_at(flight.end_s))
+    if aloft is None or not aloft.is_falling or mission.end_s < flight.end_s - SAID_AFTER_S:
+        return ""
+    lost = flight.lost_control_s
+    if lost is not None and mission.start_s <= lost:
+        return f"control was lost, and it was {aloft} as the log ends"
+    return f"it was {aloft} as the log ends" if aloft.fell_ms > FALLS_MS else ""
 
 
 def hit_of(mission: Mission) -> Hit | None:

@@ -12,6 +12,7 @@ from care_core.ecosystems.ardupilot.measures.events import (
     UNRECORDED,
     crash_of,
     failed,
+    fall_of,
     forced,
     is_over,
     never_asked,
@@ -102,8 +103,8 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Out
         yield OutcomeCheck("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
     silent: Value = lost_events(mission) or 1.0
     landed: Value = 1.0  # what does not fly comes to no harm by it
-    no_crash = 0.0 if crashed else silent
-    how = event_clause(mission, "crash") or crash
+    how = event_clause(mission, "crash") or crash or fall_of(mission)
+    no_crash = 0.0 if how else silent
     yield OutcomeCheck("no_crash", no_crash, "the autopilot reported no crash, and none shows", how)
     failsafe = event_clause(mission, "failsafe")
     yield OutcomeCheck("no_failsafe", 0.0 if failsafe else silent, "no failsafe acted", failsafe)
@@ -162,7 +163,7 @@ def _took_off(mission: Mission, *, crashed: bool) -> Value:
     flight = flight_of(mission)
     lifted = not flight.is_copter or flight.throttle is None or bool(flight.airborne)  # no height without thrust
     rose = len(heights) > 0 and bool(heights.max() > AIRBORNE_M)
-    flew = lifted and (rose or _began_aloft(mission) or _flew_by_itself(mission))
+    flew = bool(flight.leans_as_told) or (lifted and (rose or _began_aloft(mission) or _flew_by_itself(mission)))
     if flew or crashed:
         return float(flew)
     least_m = _BARELY_M if lifted else _HOVERS_M if _flew_by_itself(mission) else np.inf

@@ -85,9 +85,17 @@ def event_clause(mission: Mission, kind: str) -> str:
     if not found:
         return ""
     time_s, words = min(found, key=lambda one: one[0])
-    if words.endswith(" failsafe") and mission.start_s > _BEGUN_S and time_s - mission.start_s < _AT_ONCE_S:
+    at_once = mission.start_s > _BEGUN_S and time_s - mission.start_s < _AT_ONCE_S
+    if words.endswith(" failsafe") and at_once and not _was_over(mission, kind):
         return f"it was armed with {'an' if words[0] in _VOWELS else 'a'} {words} on"
     return f"{words} at {log_time(time_s)}"
+
+
+def _was_over(mission: Mission, kind: str) -> bool:
+    """Whether the log records that what is of this kind had passed when the vehicle was armed."""
+    records = flight_of(mission).whole.error_records
+    before = [one.code for one in records if one.time_s < mission.start_s and kind_of_error(one.subsystem) == kind]
+    return bool(before) and before[-1] == 0
 
 
 def _spoken(text: str, kind: str) -> str:
