@@ -203,15 +203,21 @@ def test_a_stall() -> None:
     assert "AIRSPEED_MIN 12" in finding.evidence
 
 
-@pytest.mark.parametrize(("done_s", "is_slow"), [(35.0, False), (48.0, True), (None, True)])
-def test_a_transition_of_a_quadplane(done_s: float | None, is_slow: bool) -> None:
+@pytest.mark.parametrize(
+    ("done_s", "told"),
+    [
+        (35.0, []),
+        (48.0, [("the transition to the wings takes too long", "warning")]),
+        (None, [("it never went over to its wings", "critical")]),
+    ],
+)
+def test_a_transition_of_a_quadplane(done_s: float | None, told: list[tuple[str, str]]) -> None:
     flown = MadePlane()
     flown.settings |= {"Q_ENABLE": 1, "Q_TRANSITION_MS": 5000}
     flown.rows["MSG"].append((25.0, {"Message": "Transition started airspeed 0.9"}))
     if done_s is not None:
         flown.rows["MSG"].append((done_s, {"Message": "Transition done"}))
-    told = [one.title for one in every_finding(flown.find()) if one.kind == "thrust"]
-    assert told == ["the transition to the wings takes too long"] * is_slow
+    assert [(one.title, one.severity) for one in every_finding(flown.find()) if one.kind == "thrust"] == told
 
 
 @pytest.mark.parametrize(("scale", "named"), [(1.1, True), (0.0, False)])
@@ -407,3 +413,18 @@ def test_gusts_on_wings_are_no_blow_before_control_is_lost(gusts: float, is_stru
     flight = made.flight()
     assert flight.lost_control_s == pytest.approx(50.3, abs=0.5)
     assert (flight.struck_s is not None) is is_struck
+
+
+@pytest.mark.parametrize(
+    ("airspeed", "throttle", "is_told"), [(13.0, 100.0, True), (13.0, 60.0, False), (17.0, 100.0, False)],
+    ids=["slow at full throttle", "slow", "nearly as fast as it cruises"],
+)  # fmt: skip
+def test_full_throttle_that_does_not_bring_a_plane_to_its_airspeed(
+    airspeed: float, throttle: float, is_told: bool
+) -> None:
+    flown = MadePlane()
+    level = flown.after(40.0, 70.0)
+    flown.table["CTUN"]["As"][level] = airspeed
+    flown.table["CTUN"]["ThO"][level] = throttle
+    titles = [one.title for one in every_finding(flown.find())]
+    assert ("full throttle does not bring it to its airspeed" in titles) == is_told

@@ -20,7 +20,7 @@ from care_core.logs.base import Wanted
 READS: Wanted = {"QTUN": ("ThO",)}
 
 LIMITS = Limits()
-_SPENT = LIMITS.add("throttle of the lift motors", 0.9, "", "a choice: any QuadPlane that can fly rises with less")
+_SPENT = LIMITS.add("throttle of the lift motors", 0.8, "", "a choice: any QuadPlane that can fly rises with less")
 _GROUNDED_S = LIMITS.add("such a throttle on the ground", 10.0, "s", "a choice: a take-off takes less")
 _KEPT = LIMITS.add("range of the outputs that is left", 0.9, "", "a choice: a share of the range as shipped")
 _TOO_LITTLE = LIMITS.add(

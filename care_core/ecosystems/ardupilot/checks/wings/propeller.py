@@ -1,5 +1,5 @@
-"""A plane's motor that draws less for its throttle than before, or that leaves it on the ground: the motor, its
-controller or the propeller failed.
+"""A plane's motor that draws less for its throttle than before, that leaves it on the ground, or at full throttle far
+below its airspeed: the motor, its controller or the propeller failed.
 
 The current of a propeller goes with the square of its throttle, near enough: over 300 simulated flights with a sound
 motor it stays within 0.93 and 1.08 times what it was, at any throttle above 30 %.
@@ -15,13 +15,13 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.statistics import lasting, steady
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.spans import during
+from care_core.ecosystems.spans import during, seconds_in
 from care_core.logs.base import Wanted
 from care_core.numbers import Floats, median, quantile
 
 READS: Wanted = {
     "BAT": ("Curr",),
-    "CTUN": ("ThO",),
+    "CTUN": ("ThO", "As"),
     "GPS": ("Spd",),
 }
 
@@ -38,15 +38,52 @@ _FULL = LIMITS.add("throttle of a take-off run", 0.95, "", "a choice: a plane th
 _RUNS_S = LIMITS.add("time of full throttle on the ground", 10.0, "s", "simulated planes lift off within 3 to 6 s")
 _SLOW = LIMITS.add("speed of such a run, as a share of AIRSPEED_MIN", 0.8, "", "a choice: near it, a plane lifts off")
 _GAINS_MS = LIMITS.add("speed that it still gains in so long", 1.0, "m/s", "a choice: more, and the run goes on")
+_SHARE = LIMITS.add(
+    "airspeed at full throttle, as a share of AIRSPEED_CRUISE", 0.75, "", "simulated planes whose engine is sound: more"
+)
+_SLOW_S = LIMITS.add("time at full throttle below it", 10.0, "s", "none of 200 simulated flights with a sound engine")
+_LEVEL_MS = LIMITS.add("climb beside which it tells", 1.0, "m/s", "a choice: a climb takes speed")
+_LACKS_P = LIMITS.add("probability of the motor then", 0.7, "", "a choice: drag, or ice, looks the same")
+_FLIES_MS = 6.0
+"""Slower than any plane flies: what hovers has no airspeed to tell."""
 _LEAST_MS = 9.0
 """AIRSPEED_MIN as shipped (ArduPlane, Parameters.cpp)."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """A drop of the current that one throttle takes; full throttle on the ground that leads to no flight."""
+    """A drop of the current that one throttle takes; full throttle that leads to no flight, or to a slow one."""
     if flight.kind == "plane":
         yield from _draws_less(flight)
         yield from _does_not_pull(flight)
+    if flight.is_winged:
+        yield from _slow_at_full(flight)
+
+
+def _slow_at_full(flight: Flight) -> Iterator[Finding]:
+    driven, height = flight.one("CTUN", "ThO", "As"), flight.height
+    cruise = flight.setting("AIRSPEED_CRUISE") or (flight.setting("TRIM_ARSPD_CM") or 0.0) / 100
+    if driven is None or height is None or not cruise:
+        return
+    t, airspeed = driven.t, driven["As"]
+    climbs = (np.interp(t + 2.0, *height) - np.interp(t - 2.0, *height)) / 4.0
+    is_slow = (airspeed > _FLIES_MS) & (airspeed < _SHARE * cruise) & (climbs < _LEVEL_MS)
+    spans = lasting(t, (driven["ThO"] > _FULL) & is_slow & during(flight.airborne, t), 2.0, gap_s=2.0)
+    lasted = seconds_in(spans)
+    if lasted > _SLOW_S:
+        flown = float(np.mean(airspeed[during(spans, t)]))
+        yield Finding(
+            kind="motor",
+            title="full throttle does not bring it to its airspeed",
+            onset_s=spans[0][0],
+            end_s=spans[-1][1],
+            severity="critical",
+            evidence=(
+                f"{flown:.1f} m/s at full throttle without a climb, for {lasted:.0f} s, where AIRSPEED_CRUISE is "
+                f"{cruise:g}: the motor, its controller or the propeller gives too little, or something drags"
+            ),
+            source="CTUN.ThO, CTUN.As, height",
+            probability=_LACKS_P,
+        )
 
 
 def _does_not_pull(flight: Flight) -> Iterator[Finding]:

@@ -21,6 +21,8 @@ READS: Wanted = {}
 LIMITS = Limits()
 _SPEEDS_UP_S = LIMITS.add("time to speed up, beside Q_TRANSITION_MS", 15.0, "s", "a choice: three times the usual")
 _WEAK_P = LIMITS.add("probability of a part", 0.35, "", "a choice: limits of throttle and airspeed slow it as well")
+_NEVER = LIMITS.add("times that limit, to the end of its flight", 3.0, "", "a choice: what can do it has done it")
+_NEVER_P = LIMITS.add("probability of a part then", 0.6, "", "a choice: THR_MAX may keep its engine down as well")
 _FADES_MS = 5000.0
 """Q_TRANSITION_MS as shipped (ArduPlane/quadplane.cpp)."""
 _BEGINS, _DONE = re.compile(r"Transition started"), re.compile(r"Transition (?:FW )?done")
@@ -38,21 +40,23 @@ def find(flight: Flight) -> Iterator[Finding]:
         start = next((t for t, text in told if _BEGINS.match(text)), None)
         if start is None:
             continue
-        over = next((t for t, text in told if t > start and (_DONE.match(text) or _is_under_way(text))), span[1])
+        broken_off = next((mode.start_s for mode in flight.modes if start < mode.start_s < span[1]), span[1])
+        over = next((t for t, text in told if t > start and (_DONE.match(text) or _is_under_way(text))), broken_off)
+        never = over == span[1] and over - start > _NEVER * limit_s
         gave_up = any(start < t <= over and _FAILED.match(text) for t, text in told)
         if over - start > limit_s or gave_up:
             yield Finding(
                 kind="thrust",
-                title="the transition to the wings takes too long",
+                title="it never went over to its wings" if never else "the transition to the wings takes too long",
                 onset_s=start,
                 end_s=over,
-                severity="warning",
+                severity="critical" if never else "warning",
                 evidence=(
                     f"{over - start:.0f} s from {log_time(start, 0)} on (limit {limit_s:.0f}: Q_TRANSITION_MS and "
                     f"{_SPEEDS_UP_S:g} s to speed up)" + ("; the vehicle says that it failed" if gave_up else "")
                 ),
                 source="MSG: Transition started, done",
-                probability=_WEAK_P,
+                probability=_NEVER_P if never else _WEAK_P,
             )
             return
 
