@@ -207,7 +207,8 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
     truth = all_met(frame, schema)
     print(f"missions left out whole: {len(frame)} runs")
     print(
-        "  runs at a distance of    time: rms  in 80 %   energy: rms  in 80 %   all met: ECE   Brier  promised ECE  Brier  plain ECE  Brier"
+        "  runs at a distance of    time: rms  in 80 %   energy: rms  in 80 %   all met: ECE   Brier  "
+        "promised: ECE  Brier  plain: ECE  Brier"
     )
     bounds = (0.0, *FAR, np.inf)
     for low, high in ((0.0, np.inf), *pairwise(bounds)):
