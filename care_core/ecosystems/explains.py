@@ -22,7 +22,9 @@ the estimator can follow, and air streams over the barometer."""
 
 EXPLAINS: Explains = {
     # --- vehicles: what fails first shows in what follows, the attitude and the crash last
-    "vibration": frozenset(("imu", "estimator", "tuning", "attitude", "crash")),  # aliased and clipped inertial data
+    "vibration": frozenset(  # aliased and clipped inertial data; at rest, of accelerometers that are noisy
+        ("imu", "estimator", "tuning", "attitude", "crash", "prearm")
+    ),
     "imu": frozenset(  # a false tilt turns the magnetic field, and keeps the vehicle from arming
         ("vibration", "estimator", "tuning", "thrust", "attitude", "crash", "compass", "prearm", "localisation")
     ),
@@ -73,6 +75,7 @@ _WORDS: Mapping[FindingKind, str] = {
     "compass": f"compass|mag|heading|yaw|{_ESTIMATED}",
     "barometer": f"baro|alt|height|vertical|{_ESTIMATED}",
     "imu": f"imu|ins|gyro|accel|attitude|roll|{_ESTIMATED}",
+    "vibration": f"accel|vibration|attitude|{_ESTIMATED}",
     "airspeed": "airspeed|pitot",
     "battery": "batt|volt|power",
     "drive": f"gps|compass|gyro|accel|mag|yaw|{_ESTIMATED}",

@@ -280,6 +280,13 @@ def test_vibration_counts_where_it_lasts() -> None:
     assert shaken(80.0, 5.0, 31.0) == [], "a hard landing"
 
 
+@pytest.mark.parametrize(("start_s", "severity"), [(20, "warning"), (53, "critical")], ids=["in flight", "at rest"])
+def test_what_shakes_though_nothing_moves_it_is_a_sensor(start_s: float, severity: str) -> None:
+    shaken = states(accel_vibration_metric=[(0, 0.3), (start_s, 15.0), (start_s + 5, 0.3)])
+    found = examine(Px4Flight(MadeLog({"vehicle_status": FLOWN, "vehicle_imu_status": shaken}))).findings
+    assert [(one.title, one.severity) for one in found] == [("strong vibration", severity)]
+
+
 def test_a_barometer_is_held_against_what_it_was_before_arming() -> None:
     def heard(after_m: float) -> list[tuple[str, str, float]]:
         t = np.arange(0.0, 60.0, 0.1)

@@ -67,12 +67,13 @@ def _shaken(flight: Px4Flight, imu: str, metric: _Metric, upset_s: float) -> Fin
         return None
     (start, _), (_, end) = lasting[0], lasting[-1]
     value = float(median(table.between(start, end)[metric.field]))
+    stands = not any(a <= end and b >= start for a, b in flight.armed)  # nothing but the sensor shakes there
     return Finding(
         kind=metric.kind,
         title=metric.title,
         onset_s=max(start - _LATE_S, 0.0),
         end_s=end,
-        severity="critical" if value > _SEVERE * metric.limit else "warning",
+        severity="critical" if stands or value > _SEVERE * metric.limit else "warning",
         evidence=f"{value:.2g} {metric.unit} in the {metric.what}' vibration metric; {metric.limit:g} is too much",
         source=f"{imu}.{metric.field}",
         probability=_TRUE_P,
