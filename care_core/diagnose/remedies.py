@@ -66,11 +66,11 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         "let it stand still while it starts, so that it calibrates its gyros; replace it if they still turn at rest",
     ),
     ("the accelerometers feel gravity upside down", "see that AHRS_ORIENTATION says how the board is mounted"),
+    ("the accelerometers do not feel gravity", "calibrate the accelerometers, and replace the autopilot if that fails"),
     (
         "it never went over to its wings|full throttle does not bring",
         "check the engine that drives it forward: motor, controller and propeller; and what THR_MAX lets it give",
     ),
-    ("the accelerometers do not feel gravity", "calibrate the accelerometers, and replace the autopilot if that fails"),
     (
         r"only \d+ satellites|poor satellite geometry",
         "wait under open sky for more satellites before arming, and look at the GPS antenna if they do not come",

@@ -418,10 +418,9 @@ class Airborne(Armed):
         return min((*hits, *self._struck_ground(), *self._lies_on_its_side()), key=lambda hit: hit.time_s, default=None)
 
     def _struck_ground(self) -> Iterator[Hit]:
-        table = self.one("IMU", "AccX", "AccY", "AccZ")
-        if table is None or not flies(self.kind):
+        if self._felt is None or not flies(self.kind):
             return
-        t, felt = table.t, _magnitude(table)
+        t, felt = self._felt
         for at in t[(felt > _SHOCK) & during(self.armed, t)].tolist():
             if not self._stands_out(at):
                 continue
@@ -484,10 +483,10 @@ class Airborne(Armed):
     def _grazed(self) -> Hit | None:
         """A blow at the ground that took much of a plane's speed, though it came from above and flew on; None where
         there was none."""
-        table, height, moved = self.one("IMU", "AccX", "AccY", "AccZ"), self.height, self.one("GPS", "Spd")
-        if table is None or height is None or moved is None or not self.is_winged:
+        height, moved = self.height, self.one("GPS", "Spd")
+        if self._felt is None or height is None or moved is None or not self.is_winged:
             return None
-        t, felt = table.t, _magnitude(table)
+        t, felt = self._felt
         for at, _ in runs(t, (felt > _GRAZES) & during(self.airborne, t), gap_s=_STRUCK_S):
             before, after = self._flew_ms(at), moved["Spd"][(moved.t > at) & (moved.t < at + _STRUCK_S)]
             from_above = float(np.max(height[1][(height[0] > at - _HIT_LOST_S) & (height[0] < at)], initial=0.0))
@@ -570,10 +569,10 @@ class Airborne(Armed):
 
     def shock_after(self, first: float) -> float | None:
         """When it was first shaken beyond what flight does, from a time on; None where it was not."""
-        table = self.one("IMU", "AccX", "AccY", "AccZ")
-        if table is None:
+        if self._felt is None:
             return None
-        shaken = table.t[(_magnitude(table) > _SHOCK) & (table.t >= first)].tolist()
+        t, felt = self._felt
+        shaken = t[(felt > _SHOCK) & (t >= first)].tolist()
         return next((t for t in shaken if not self.is_winged or (self._stands_out(t) and self._ends_flight(t))), None)
 
     def _ends_flight(self, at: float) -> bool:
@@ -611,12 +610,19 @@ class Airborne(Armed):
         hard = (t for t, felt in flown if felt > _HARD * _SHOCK or _stops_at(moved, t))
         return min((*hard, *just_before, *_out_of_the_blue(flown)), default=None)
 
+    @cached_property
+    def _felt(self) -> tuple[Floats, Floats] | None:
+        """Time and size of what its accelerometers feel, m/s^2."""
+        table = self.one("IMU", "AccX", "AccY", "AccZ")
+        return (
+            None if table is None else (table.t, np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2))
+        )
+
     def _stands_out(self, at: float) -> bool:
         """Whether nothing that was felt until shortly before comes near a blow, as gusts on wings do."""
-        table = self.one("IMU", "AccX", "AccY", "AccZ")
-        if table is None:
+        if self._felt is None:
             return False
-        t, felt = table.t, _magnitude(table)
+        t, felt = self._felt
         blow = float(np.max(felt[(t >= at) & (t <= at + _STRUCK_S)]))
         usual = felt[(t >= at - _REST_S) & (t < at - _SWAYS_S)]
         return not len(usual) or blow > _BLOW * float(np.max(usual))
@@ -658,11 +664,10 @@ class Airborne(Armed):
     def _blows(self) -> Iterator[tuple[float, float]]:
         """Each time that it was shaken beyond what flight does, and by how much, m/s^2; 0 where all that is
         told is that a sensor clipped, which vibration does as well."""
-        table = self.one("IMU", "AccX", "AccY", "AccZ")
-        if table is not None:
-            felt = _magnitude(table)
+        if self._felt is not None:
+            t, felt = self._felt
             shaken = felt > _SHOCK
-            yield from zip(table.t[shaken].tolist(), felt[shaken].tolist(), strict=True)
+            yield from zip(t[shaken].tolist(), felt[shaken].tolist(), strict=True)
         for one in self.all("VIBE", "Clip"):
             clipped = np.append(False, np.diff(one["Clip"]) > 0)
             yield from ((t, 0.0) for t in one.t[clipped].tolist())
@@ -696,10 +701,6 @@ def _after(series: tuple[Floats, Floats] | None, at: float) -> Floats:
         return np.empty(0)
     t, values = series
     return values[(t > at + _BEFORE_HIT_S) & (t < at + _REST_S)]
-
-
-def _magnitude(accelerations: Table) -> Floats:
-    return np.asarray(np.sqrt(accelerations["AccX"] ** 2 + accelerations["AccY"] ** 2 + accelerations["AccZ"] ** 2))
 
 
 def _off_demand(part: Table) -> Floats:

@@ -49,7 +49,10 @@ def find(flight: Flight) -> Iterator[Finding]:
         onset_s=start,
         end_s=end,
         severity="critical",
-        evidence=f"{end - start:.0f} s of all the thrust that the lift motors may give without rising{ended}",
+        evidence=(
+            f"{end - start:.0f} s of {100 * _SPENT:.0f} % and more of what the lift motors may give, without "
+            f"rising{ended}"
+        ),
         source="QTUN.ThO, height; PARM",
         suspect="hardware" if kept is None else "parameter",
         probability=_PART_P if kept is None else float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE_P, _UNSURE))),
