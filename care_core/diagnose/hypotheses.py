@@ -14,6 +14,7 @@ Each is a cause of one noisy-OR (`noisy_or`), with the probability that it is th
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from math import inf
 from types import MappingProxyType
 
 import numpy as np
@@ -96,6 +97,7 @@ def failure_of(
     shown: Mapping[str, Evidence],
     outside: Mapping[str, float] = NONE_OUTSIDE,
     untold: float = 0.0,
+    late_from: float = inf,
 ) -> NoisyOr:
     """The causes that may have broken these objectives.
 
@@ -105,6 +107,7 @@ def failure_of(
         shown: by title, the findings that say which options they speak of (`evidence_of_findings`).
         outside: how likely each parameter outside the profile is wrong and loses a mission in this way.
         untold: share of the options whose value is not known.
+        late_from: log time (s) from which the run had taken more than its mission may take.
     """
     before = query.before()
     names = [result.variable.name for result in broken]
@@ -126,7 +129,7 @@ def failure_of(
         {
             CHANCE: chance,
             UNKNOWN: _either(UNMODELLED.value, UNSAID.value * untold),
-            **with_findings(causes, findings, outlasts=any(result.variable.grows for result in broken)),
+            **with_findings(causes, findings, late_from),
         }
     )
 
@@ -254,12 +257,13 @@ def _either(*shares: float) -> float:
 
 
 def with_findings(
-    causes: Mapping[Key, float], findings: Iterable[Finding], *, outlasts: bool = False
+    causes: Mapping[Key, float], findings: Iterable[Finding], late_from: float = inf
 ) -> dict[Key, float]:
     """The causes with what the log shows, in the order told; what came after the impact explains nothing.
 
     Args:
-        outlasts: the run took more than its mission may take: a pack that gives out by no other sign is late, too.
+        late_from: log time (s) from which the run had taken more than its mission may take: a pack that gives out then,
+            by no other sign, is late, too.
     """
     found = dict(causes)
     seen = [finding for finding in _acting(tuple(findings)) if finding.severity != "info"]
@@ -271,7 +275,7 @@ def with_findings(
         if _is_the_reason_itself(finding, causes):
             shares["world", finding.title] = REFUSED_ITSELF.value
         if finding.suspect in _WHAT:
-            gave_out = outlasts and finding.kind == "battery" and finding.probability < LIKELY
+            gave_out = finding.onset_s >= late_from and finding.kind == "battery" and finding.probability < LIKELY
             late = gave_out or is_late(finding, by_setting)
             shares[_WHAT[finding.suspect], finding.title] = whole * (LATE.value if late else 1.0)
         found |= {key: max(found.get(key, 0.0), share) for key, share in shares.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
+from math import inf
 
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Summary
@@ -60,6 +61,15 @@ class Judged(Record, eq=False):
     @property
     def broken(self) -> tuple[ObjectiveResult, ...]:
         return tuple(result for result in self.results if result.status == "fault")
+
+    @property
+    def late_from(self) -> float:
+        """Log time (s) from which the run has taken more than its mission may take, infinite where no limit says."""
+        if any(result.variable.grows for result in self.broken):
+            return -inf
+        timed = (result for result in self.results if result.variable.grows and result.variable.unit == "s")
+        limits = (result.limit_at_most.value for result in timed if result.limit_at_most is not None)
+        return self.run.mission.start_s + min(limits, default=inf)
 
 
 def read_and_judge(

@@ -45,12 +45,12 @@ def weigh(options: Mapping[str, float], chance: float, findings: Sequence[Findin
     return hypotheses_of(NoisyOr({CHANCE: chance, UNKNOWN: UNMODELLED.value, **causes}))
 
 
-@pytest.mark.parametrize(("probability", "outlasts", "share"), [(0.1, False, 0.1), (0.1, True, 0.01), (0.9, True, 0.9)])
-def test_a_pack_that_gives_out_in_a_run_that_took_too_much_is_doubted_unless_it_shows(
-    probability: float, outlasts: bool, share: float
+@pytest.mark.parametrize(("probability", "late_from", "share"), [(0.1, 62.0, 0.1), (0.1, 60.0, 0.01), (0.9, 60.0, 0.9)])
+def test_a_pack_that_gives_out_when_the_run_has_taken_too_much_is_doubted_unless_it_shows(
+    probability: float, late_from: float, share: float
 ) -> None:
     pack = replace(finding(probability, "warning"), kind="battery", mission_lost=1.0)
-    causes = with_findings({}, [pack], outlasts=outlasts)
+    causes = with_findings({}, [pack], late_from=late_from)
     assert causes["hardware", pack.title] == pytest.approx(share)
 
 
