@@ -229,6 +229,8 @@ class MissionInfo(Record):
     """Why it is not the profile's mission, in one sentence; empty when it fits."""
     asked: tuple[tuple[str, float], ...] = ()
     """What the mission asks for, by context, known before it is flown: runs that were asked the same compare."""
+    left_s: float | None = None
+    """When a failsafe took the robot off the mission, in seconds of the log; None where none did."""
 
 
 class Run(Record):

@@ -55,5 +55,5 @@ def blame(
     outside = suspects_outside(run, broken, health, schema, query, good)
     weights = {one.name: one.weight for one in outside}
     untold = 1.0 - sum(option.name in run.config for option in schema.options) / max(1, len(schema.options))
-    failure = failure_of(query, broken, found, run.refused_by, health.findings, said, weights, untold, judged.late_from)
+    failure = failure_of(query, broken, found, run.refused_by, health.findings, said, weights, untold)
     return Blame(run, found, outside, failure)

@@ -14,7 +14,6 @@ Each is a cause of one noisy-OR (`noisy_or`), with the probability that it is th
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from math import inf
 from types import MappingProxyType
 
 import numpy as np
@@ -71,6 +70,8 @@ UNNAMED = "chance, or what no log shows"
 NOT_SHOWN = "nothing that this log shows"
 """The same where it stands alone."""
 NONE_OUTSIDE: Mapping[str, float] = MappingProxyType({})
+_ENDING: frozenset[FindingKind] = frozenset(("battery", "log"))
+"""Kinds that end a run which goes on for too long."""
 _WHAT: Mapping[SuspectKind, What] = {"hardware": "hardware", "world": "world", "operation": "world"}
 
 
@@ -97,7 +98,6 @@ def failure_of(
     shown: Mapping[str, Evidence],
     outside: Mapping[str, float] = NONE_OUTSIDE,
     untold: float = 0.0,
-    late_from: float = inf,
 ) -> NoisyOr:
     """The causes that may have broken these objectives.
 
@@ -107,7 +107,6 @@ def failure_of(
         shown: by title, the findings that say which options they speak of (`evidence_of_findings`).
         outside: how likely each parameter outside the profile is wrong and loses a mission in this way.
         untold: share of the options whose value is not known.
-        late_from: log time (s) from which the run had taken more than its mission may take.
     """
     before = query.before()
     names = [result.variable.name for result in broken]
@@ -129,7 +128,7 @@ def failure_of(
         {
             CHANCE: chance,
             UNKNOWN: _either(UNMODELLED.value, UNSAID.value * untold),
-            **with_findings(causes, findings, late_from),
+            **with_findings(causes, findings, outlasts=any(result.variable.grows for result in broken)),
         }
     )
 
@@ -257,13 +256,13 @@ def _either(*shares: float) -> float:
 
 
 def with_findings(
-    causes: Mapping[Key, float], findings: Iterable[Finding], late_from: float = inf
+    causes: Mapping[Key, float], findings: Iterable[Finding], *, outlasts: bool = False
 ) -> dict[Key, float]:
     """The causes with what the log shows, in the order told; what came after the impact explains nothing.
 
     Args:
-        late_from: log time (s) from which the run had taken more than its mission may take: a pack that gives out then,
-            by no other sign, is late, too.
+        outlasts: the run took more than its mission may take: a pack that gives out by no other sign, and a log that
+            ends on the way, are late, too.
     """
     found = dict(causes)
     seen = [finding for finding in _acting(tuple(findings)) if finding.severity != "info"]
@@ -275,7 +274,7 @@ def with_findings(
         if _is_the_reason_itself(finding, causes):
             shares["world", finding.title] = REFUSED_ITSELF.value
         if finding.suspect in _WHAT:
-            gave_out = finding.onset_s >= late_from and finding.kind == "battery" and finding.probability < LIKELY
+            gave_out = outlasts and finding.kind in _ENDING and finding.probability < LIKELY
             late = gave_out or is_late(finding, by_setting)
             shares[_WHAT[finding.suspect], finding.title] = whole * (LATE.value if late else 1.0)
         found |= {key: max(found.get(key, 0.0), share) for key, share in shares.items()}

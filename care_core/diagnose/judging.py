@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from math import inf
 
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Summary
@@ -61,15 +60,6 @@ class Judged(Record, eq=False):
     @property
     def broken(self) -> tuple[ObjectiveResult, ...]:
         return tuple(result for result in self.results if result.status == "fault")
-
-    @property
-    def late_from(self) -> float:
-        """Log time (s) from which the run has taken more than its mission may take, infinite where no limit says."""
-        if any(result.variable.grows for result in self.broken):
-            return -inf
-        timed = (result for result in self.results if result.variable.grows and result.variable.unit == "s")
-        limits = (result.limit_at_most.value for result in timed if result.limit_at_most is not None)
-        return self.run.mission.start_s + min(limits, default=inf)
 
 
 def read_and_judge(
@@ -212,7 +202,7 @@ def judge(
             bounds.get(objective.name),
             model.summary_at(objective.name, reference.config),
             needs.get(objective.name),
-            so_far=objective.name in past,
+            so_far=_broken_so_far(run) if objective.name in past else "",
             literal=_is_literal(objective, own),
             shortfall=run.shortfall,
         )
@@ -276,9 +266,13 @@ def _past_their_limits(
     run: Run, so_far: Mapping[str, Value], schema: Schema, bounds: Mapping[str, Threshold], needs: Mapping[str, Need]
 ) -> dict[str, float]:
     """Objectives that are broken already, however much the reference configuration needs, for they only grow: of a
-    mission whose end the log does not hold, and of one that was flown to its end and that a failsafe came into."""
-    if run.mission.ended and not all(_FAILSAFE in clause for clause in run.shortfall or ("",)):
-        return {}
+    mission whose end the log does not hold, and of one that was flown to its end and that a failsafe came into. Of one
+    that a failsafe broke off, the time that it had taken until then."""
+    if run.mission.ended and not _was_flown_whole(run):
+        if run.mission.left_s is None:
+            return {}
+        taken_s = run.mission.left_s - run.mission.start_s
+        so_far = {objective.name: taken_s for objective in schema.objectives if objective.unit == "s"}
     past: dict[str, float] = {}
     for objective in schema.objectives:
         name, value = objective.name, so_far.get(objective.name)
@@ -289,6 +283,18 @@ def _past_their_limits(
         if not limit.met(value):
             past[name] = value
     return past
+
+
+def _was_flown_whole(run: Run) -> bool:
+    """Whether a failsafe is all that a mission is told to have failed by."""
+    return all(_FAILSAFE in clause for clause in run.shortfall or ("",))
+
+
+def _broken_so_far(run: Run) -> str:
+    """Why what was broken was so before the end, empty where the mission was flown to it."""
+    if not run.mission.ended:
+        return "the log ends before the mission does"
+    return "" if _was_flown_whole(run) else "a failsafe broke the mission off"
 
 
 def meaningful(
@@ -407,7 +413,7 @@ def _judge_one(
     summary: Summary | None = None,
     need: Need | None = None,
     *,
-    so_far: bool = False,
+    so_far: str = "",
     literal: bool = False,
     shortfall: Sequence[str] = (),
 ) -> ObjectiveResult:
@@ -427,7 +433,7 @@ def _judge_one(
     # A yes-or-no result has no place among others.
     percentile = summary.percentile(value) if summary and objective.kind == "non-functional" else None
     if so_far:
-        reason = "so far: the log ends before the mission does"
+        reason = f"so far: {so_far}"
     elif status == "fault" and objective.kind == "functional":
         reason = "; ".join(shortfall)
     return ObjectiveResult(objective, value, bound, status, reason, percentile=percentile, need=need)

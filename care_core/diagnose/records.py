@@ -58,13 +58,6 @@ class ObjectiveResult(Record):
         return outcome(self.name, self.variable.kind, self.value, self.variable.unit, wanted, self.reason)
 
     @property
-    def limit_at_most(self) -> Threshold | None:
-        """The threshold where the need lies at the upper end of its interval."""
-        if self.need is None or self.variable.relative is None:
-            return self.threshold
-        return self.variable.relative.for_need(self.need.high)
-
-    @property
     def is_sure(self) -> bool:
         """Whether the verdict holds wherever in its interval the need lies."""
         if self.need is None or self.value is None or self.variable.relative is None:

@@ -141,6 +141,10 @@ class MissionKind(ABC):
         """Whether the log says how the mission came out: it holds its end, or what made it fail for good."""
         return mission.ended
 
+    def left_s(self, mission: Mission) -> float | None:
+        """When a failsafe took the robot off its mission, None where none did."""
+        return None
+
     def checks(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         """What a run that had no mission is judged by; none where there was one."""
         return ()

@@ -181,6 +181,7 @@ class _Source(Record, eq=False):
                 start_s=mission.start_s,
                 end_s=mission.end_s,
                 ended=self.kind.is_decided(mission),
+                left_s=self.kind.left_s(mission),
                 fits=not mismatch,
                 mismatch=mismatch,
                 asked=tuple(

@@ -13,7 +13,7 @@ from care_core.diagnose.hypotheses import UNTOLD_BY_FIT, hypotheses_of, hypothes
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, NoisyOr
 from care_core.diagnose.parts import OUTLASTED
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
-from care_core.ecosystems.findings import SAGS, UNCHARGED, Finding, Severity, SuspectKind
+from care_core.ecosystems.findings import SAGS, UNCHARGED, Finding, FindingKind, Severity, SuspectKind
 from care_core.records import replace
 from care_core.run import Evidence
 from care_core.variables import Role, Threshold, Variable
@@ -45,12 +45,13 @@ def weigh(options: Mapping[str, float], chance: float, findings: Sequence[Findin
     return hypotheses_of(NoisyOr({CHANCE: chance, UNKNOWN: UNMODELLED.value, **causes}))
 
 
-@pytest.mark.parametrize(("probability", "late_from", "share"), [(0.1, 62.0, 0.1), (0.1, 60.0, 0.01), (0.9, 60.0, 0.9)])
-def test_a_pack_that_gives_out_when_the_run_has_taken_too_much_is_doubted_unless_it_shows(
-    probability: float, late_from: float, share: float
+@pytest.mark.parametrize(("probability", "outlasts", "share"), [(0.1, False, 0.1), (0.1, True, 0.01), (0.9, True, 0.9)])
+@pytest.mark.parametrize("kind", ["battery", "log"])
+def test_what_ends_a_run_that_took_too_much_is_doubted_unless_it_shows(
+    kind: FindingKind, probability: float, outlasts: bool, share: float
 ) -> None:
-    pack = replace(finding(probability, "warning"), kind="battery", mission_lost=1.0)
-    causes = with_findings({}, [pack], late_from=late_from)
+    pack = replace(finding(probability, "warning"), kind=kind, mission_lost=1.0)
+    causes = with_findings({}, [pack], outlasts=outlasts)
     assert causes["hardware", pack.title] == pytest.approx(share)
 
 

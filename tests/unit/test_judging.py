@@ -111,6 +111,19 @@ def test_a_failsafe_that_came_into_a_mission_excuses_no_time_past_its_limit(
     assert judge(short, schema, MODEL).results[1].status == "not_evaluated"
 
 
+@pytest.mark.parametrize(("taken_s", "status"), [(1e4, "fault"), (1.0, "not_evaluated")])
+def test_a_mission_that_a_failsafe_broke_off_past_its_time_took_too_long(taken_s: float, status: str) -> None:
+    schema = with_variable(SCHEMA, replace(TIME, grows=True, unit="s"))
+    run = planted_run()
+    left = replace(run.mission, left_s=run.mission.start_s + taken_s)
+    short = ("2 of 5 mission items were reached", "the battery failsafe acted at 124.1 s")
+    run = replace(run, mission=left, objectives={"success": 0.0, "time": 1e5, "energy": 1e5}, shortfall=short)
+    time, energy = judge(run, schema, MODEL).results[1:3]
+    assert (time.status, energy.status) == (status, "not_evaluated")
+    if status == "fault":
+        assert (time.value, time.reason) == (taken_s, "so far: a failsafe broke the mission off")
+
+
 def test_a_log_that_ends_early_evaluates_nothing() -> None:
     run = planted_run()
     judged = judge(replace(run, mission=replace(run.mission, ended=False)), SCHEMA, MODEL)

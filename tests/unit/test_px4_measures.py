@@ -150,6 +150,27 @@ def test_a_flight_that_broke_off_knows_what_it_reached() -> None:
     assert not found.all_reached
 
 
+@pytest.mark.parametrize(("told_s", "legs"), [(41.0, 3), (51.0, 2)])
+def test_what_comes_next_on_the_way_home_is_no_part_of_the_mission(told_s: float, legs: int) -> None:
+    back = flown()
+    status = {**back["vehicle_status"].columns, "nav_state": steps((0, 4), (5, MISSION), (50, BACK))}
+    ground = (*HOME[:2], 0.0)  # a return names the place where it lands without its height
+    rows = [(41.0, 0.0, math.nan, math.nan, 0.0), (told_s, 1.0, *ground)]
+    early = mission(
+        vehicle_status=Table(AT, status),
+        navigator_mission_item=back["navigator_mission_item"].between(0.0, 45.0),
+        position_setpoint_triplet=table(rows, "next.valid", "next.lat", "next.lon", "next.alt"),
+    )
+    assert value("px4_mission_asked", early, what="legs") == legs
+
+
+def test_a_failsafe_tells_when_the_mission_was_left() -> None:
+    kind = MISSION_KINDS["px4_flight"]
+    status = {**flown()["vehicle_status"].columns, "failsafe": steps((0, 0), (60, 1))}
+    assert kind.left_s(mission(vehicle_status=Table(AT, status))) == pytest.approx(60.0)
+    assert kind.left_s(mission()) is None
+
+
 @pytest.mark.parametrize(("last", "success"), [(6.0, 1.0), (5.0, 0.0)])
 def test_a_mission_is_whole_once_its_last_item_was_reached_whatever_has_no_place(last: float, success: float) -> None:
     rows = [(5.0, -1.0), (20.0, 0.0), (40.0, 1.0), (60.0, 2.0), (85.0, 3.0), (86.0, last), (132.0, last)]

@@ -27,7 +27,7 @@ from care_core.ecosystems.px4.flight import (
 )
 from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.px4.measures.flown import NEEDS, is_armed, span_of_phase
-from care_core.ecosystems.px4.measures.outcome import failsafe_s, flew_automatically, halted, lost_s
+from care_core.ecosystems.px4.measures.outcome import failsafe_s, flew_automatically, halted, left_s, lost_s
 from care_core.ecosystems.px4.measures.shortfall import evidence, shortfall
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import mode_name, way_of
@@ -75,6 +75,9 @@ class Px4Missions(MissionKind):
 
     def is_decided(self, mission: Mission) -> bool:
         return mission.ended or any(one(mission) is not None for one in (lost_s, failsafe_s, halted))
+
+    def left_s(self, mission: Mission) -> float | None:
+        return left_s(mission)
 
     def checks(self, mission: Mission) -> tuple[OutcomeCheck, ...]:
         return () if not is_armed(mission) or flew_automatically(mission) else self.outcome(mission)

@@ -15,7 +15,7 @@ _OLD_FLAGS, _ESTIMATOR = "vehicle_status_flags", "estimator_status_flags"
 LIMITS = Limits()  # the vehicle applies its own
 _FLIGHTS = "training flights"
 _LOW_P = LIMITS.add(
-    "probability of a battery that will not last", 0.1, "", f"{_FLIGHTS}: none of 10 whose battery shows nothing else"
+    "probability of a battery that will not last", 0.03, "", "flights: none of 17 whose battery shows nothing else"
 )
 _LOW_LOST_P = LIMITS.add("probability that a mission fails with such a battery", 0.9, "", f"{_FLIGHTS}: 17 of 19")
 _NOWHERE_P = LIMITS.add("probability of the GPS, no global position", 0.9, "", f"{_FLIGHTS}: 8 of 8")

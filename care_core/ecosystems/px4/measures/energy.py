@@ -10,7 +10,8 @@ import numpy as np
 from care_core.ecosystems.coverage import EXTREME, SUM, USUAL, Bears, Samples
 from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, has, missing
 from care_core.ecosystems.plausible import is_alive
-from care_core.ecosystems.px4.measures.flown import NEEDS, PHASE_ARGS, flight_of, is_armed, span_of_phase
+from care_core.ecosystems.px4.measures.flown import NEEDS, PHASE_ARGS, is_armed, span_of_phase
+from care_core.ecosystems.px4.measures.requested import flight_of
 from care_core.ecosystems.vehicles.arming import NEVER_ARMED
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import median

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from care_core.ecosystems.measures import Mission, has, numeric, one_of
-from care_core.ecosystems.px4.flight import LANDED, POSITION, READS, RESULT, Px4Flight
+from care_core.ecosystems.px4.flight import LANDED, POSITION, READS, RESULT
 from care_core.ecosystems.px4.flown_mission import did_last_item
 from care_core.ecosystems.px4.measures.requested import (
     ITEMS,
@@ -20,6 +20,7 @@ from care_core.ecosystems.px4.measures.requested import (
     RETURN,
     Item,
     end_of,
+    flight_of,
     home_of,
     items_begun,
     items_in_all,
@@ -97,12 +98,6 @@ class FlownMission(Record, eq=False):
         track = self.track.filled_in()
         going = self.under_way(track.t) & (track.t >= self.legs.start_s) & (track.t <= self.legs.end_s)
         return distance_to_legs(np.column_stack((track.north[going], track.east[going])), self.corners)
-
-
-def flight_of(mission: Mission) -> Px4Flight:
-    """The model of the flight that a mission is part of."""
-    assert isinstance(mission.model, Px4Flight)
-    return mission.model
 
 
 def is_armed(mission: Mission) -> bool:

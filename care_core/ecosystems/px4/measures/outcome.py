@@ -11,7 +11,8 @@ from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
 from care_core.ecosystems.px4 import failsafes, upset
 from care_core.ecosystems.px4.flight import MESSAGES, RESULT, STATUS
 from care_core.ecosystems.px4.flown_mission import mission_outcome
-from care_core.ecosystems.px4.measures.flown import NEEDS, flight_of, flown_mission, is_armed
+from care_core.ecosystems.px4.measures.flown import NEEDS, flown_mission, is_armed
+from care_core.ecosystems.px4.measures.requested import flight_of
 from care_core.ecosystems.px4.measures.route import landing_error
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.ecosystems.vehicles.arming import CUT, NEVER_ARMED
@@ -41,6 +42,11 @@ def everything(mission: Mission, args: Args) -> Iterator[Samples]:
 def failsafe_s(mission: Mission) -> float | None:
     """When a failsafe first acted in the mission, None where none did."""
     return flight_of(mission).first_s(STATUS, "failsafe", 1, (mission.start_s, mission.end_s))
+
+
+def left_s(mission: Mission) -> float | None:
+    """When a failsafe took the vehicle off the mission that it was flying, None where none did."""
+    return failsafe_s(mission) if flew_automatically(mission) else None
 
 
 def reasons_of_failsafe(mission: Mission) -> tuple[str, ...]:

@@ -13,7 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
-from care_core.ecosystems.px4.flight import RESULT, RESULT_FIELDS
+from care_core.ecosystems.px4.flight import RESULT, RESULT_FIELDS, Px4Flight
+from care_core.ecosystems.vehicles import way_of
 from care_core.ecosystems.vehicles.way import NUMBERS, Ending, RequestedMission, number_asked
 from care_core.geodesy import offset_m
 from care_core.logs.base import Table, Wanted
@@ -64,6 +65,12 @@ class Home(Record):
     def offset(self, lat: float, lon: float) -> tuple[float, float]:
         """Metres north and east of home."""
         return offset_m((self.lat, self.lon), lat, lon)
+
+
+def flight_of(mission: Mission) -> Px4Flight:
+    """The model of the flight that a mission is part of."""
+    assert isinstance(mission.model, Px4Flight)
+    return mission.model
 
 
 def home_of(mission: Mission) -> Home | None:
@@ -178,15 +185,23 @@ def _speed(mission: Mission, begun_s: float) -> float:
 
 
 def _next_place(mission: Mission, items: Mapping[int, Item], home: Home) -> Iterator[tuple[float, float, float]]:
-    """The place after the item that was begun last, where the mission broke off before it."""
+    """The place after the item that was begun last, where the mission broke off before it. What comes next once the
+    mission is left is of the way home."""
     sent = mission.table(TRIPLET)
     if not has(sent, "next.valid", "next.lat", "next.lon", "next.alt"):
         return
-    since = sent.between(items[max(items)].begun_s, mission.end_s)
+    begun_s = items[max(items)].begun_s
+    since = sent.between(begun_s, _left_s(mission, begun_s))
     known = since.where((since["next.valid"] == 1) & np.isfinite(since["next.lat"] + since["next.lon"]))
     if len(known):
         lat, lon, alt = (float(known[f"next.{name}"][0]) for name in ("lat", "lon", "alt"))
         yield *home.offset(lat, lon), alt - home.alt_m
+
+
+def _left_s(mission: Mission, begun_s: float) -> float:
+    """When the vehicle left the mission for another mode after an item was begun, else when the flight ended."""
+    left = (t for t, mode in flight_of(mission).modes if t > begun_s and way_of("px4", mode) != "mission")
+    return min(next(left, mission.end_s), mission.end_s)
 
 
 def items_in_all(mission: Mission) -> int | None:

@@ -12,12 +12,11 @@ from care_core.ecosystems.px4.flight import POSITION
 from care_core.ecosystems.px4.measures.flown import (
     NEEDS,
     PHASE_ARGS,
-    flight_of,
     flown_mission,
     is_armed,
     span_of_phase,
 )
-from care_core.ecosystems.px4.measures.requested import ITEM, requested_mission
+from care_core.ecosystems.px4.measures.requested import ITEM, flight_of, requested_mission
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.statistic import statistic
 from care_core.ecosystems.vehicles import way

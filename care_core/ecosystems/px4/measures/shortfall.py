@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from care_core.ecosystems.measures import Mission
 from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.failsafes import in_words
-from care_core.ecosystems.px4.measures.flown import flight_of, flown_mission, is_armed
+from care_core.ecosystems.px4.measures.flown import flown_mission, is_armed
 from care_core.ecosystems.px4.measures.outcome import TOLERANCE_M, failsafe_s, halted, lost_s
+from care_core.ecosystems.px4.measures.requested import flight_of
 from care_core.ecosystems.px4.measures.route import landing_error
 from care_core.run import Evidence, Unavailable, is_known
 from care_core.text import log_time

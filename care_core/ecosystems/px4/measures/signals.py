@@ -14,7 +14,8 @@ from care_core.ecosystems.coverage import EXTREME, MEAN, USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, has, missing, one_of
 from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED
 from care_core.ecosystems.px4.flight import POSITION
-from care_core.ecosystems.px4.measures.flown import NEEDS, PHASE_ARGS, flight_of, flown_mission, span_of_phase
+from care_core.ecosystems.px4.measures.flown import NEEDS, PHASE_ARGS, flown_mission, span_of_phase
+from care_core.ecosystems.px4.measures.requested import flight_of
 from care_core.ecosystems.statistic import STATISTIC, statistic
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import Floats, median
