@@ -280,6 +280,21 @@ def test_vibration_counts_where_it_lasts() -> None:
     assert shaken(80.0, 5.0, 31.0) == [], "a hard landing"
 
 
+@pytest.mark.parametrize(
+    ("before", "start_s", "until_s", "found"),
+    [(1.5, 30, 45, True), (2.5, 30, 45, False), (1.5, 30, 36, False), (1.5, 16, 45, False)],
+    ids=["rose", "as it always shook", "for a moment", "from the take-off on"],
+)
+def test_vibration_that_rose_in_flight_counts_below_what_is_too_much_of_any(
+    before: float, start_s: float, until_s: float, found: bool
+) -> None:
+    heights = states(x=[(0, 0.0)], y=[(0, 0.0)], z=[(0, 0.0), (12, -10.0), (48, 0.0)])
+    shaken = states(accel_vibration_metric=[(0, 0.1), (12, before), (start_s, 6.0), (until_s, before)])
+    told = found_in({"vehicle_local_position": heights, "vehicle_imu_status": shaken})
+    rose = [("vibration", "vibration that rose in flight", start_s - 1.5)]
+    assert [one for one in told if one[0] == "vibration"] == (rose if found else [])
+
+
 @pytest.mark.parametrize(("start_s", "severity"), [(20, "warning"), (53, "critical")], ids=["in flight", "at rest"])
 def test_what_shakes_though_nothing_moves_it_is_a_sensor(start_s: float, severity: str) -> None:
     shaken = states(accel_vibration_metric=[(0, 0.3), (start_s, 15.0), (start_s + 5, 0.3)])

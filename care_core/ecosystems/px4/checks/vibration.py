@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.flight import Px4Flight
-from care_core.ecosystems.spans import runs
+from care_core.ecosystems.spans import inside, runs
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import median
 from care_core.records import Record
@@ -23,6 +25,13 @@ LIMITS = Limits()
 _LASTS_S = LIMITS.add("shortest time of it", 2.0, "s", "a choice: a hard landing is over sooner")
 _SEVERE = LIMITS.add("critical vibration or noise, in limits", 2.0, "", "a choice: real quadcopters fly at one limit")
 _LATE_S = LIMITS.add("time by which a record comes late", 1.5, "s", "it is of the second before it")
+_RISEN = LIMITS.add(
+    "vibration that rose in flight, of what it was", 3.0, "", "317 flights with sound accelerometers: 2.3"
+)
+_ORANGE = LIMITS.add("vibration that counts where it rose", 4.9, "m/s^2", "Flight Review draws it orange from there")
+_STAYS_S = LIMITS.add(
+    "shortest time of vibration that rose", 10.0, "s", "a choice: a descent through the wake is over sooner"
+)
 _TRUE_P = LIMITS.add("probability that it is so", 0.9, "", "training flights: 17 of 17, and none of 450 without")
 
 
@@ -37,9 +46,12 @@ class _Metric(Record):
     limit: float
 
 
+VIBRATION = _Metric(
+    "accel_vibration_metric", "vibration", "strong vibration", "accelerometers", "m/s^2",
+    LIMITS.add("vibration of an accelerometer", 9.81, "m/s^2", "Flight Review draws it red from there"),
+)  # fmt: skip
 METRICS = (
-    _Metric("accel_vibration_metric", "vibration", "strong vibration", "accelerometers", "m/s^2",
-            LIMITS.add("vibration of an accelerometer", 9.81, "m/s^2", "Flight Review draws it red from there")),
+    VIBRATION,
     _Metric("gyro_vibration_metric", "imu", "noisy gyros", "gyros", "rad/s",
             LIMITS.add("vibration of a gyro", 0.6, "rad/s", "a rough quadcopter of a maker is above 0.5 at times")),
 )  # fmt: skip
@@ -54,6 +66,8 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         first = min((one for one in found if one is not None), key=lambda one: one.onset_s, default=None)
         if first is not None:
             yield first
+        elif metric is VIBRATION:
+            yield from filter(None, [_risen(flight, upset_s)])
 
 
 def _shaken(flight: Px4Flight, imu: str, metric: _Metric, upset_s: float) -> Finding | None:
@@ -78,6 +92,31 @@ def _shaken(flight: Px4Flight, imu: str, metric: _Metric, upset_s: float) -> Fin
         source=f"{imu}.{metric.field}",
         probability=_TRUE_P,
     )
+
+
+def _risen(flight: Px4Flight, upset_s: float) -> Finding | None:
+    """Vibration below what is too much of any vehicle, and far more than this one had in the air before."""
+    table = flight.table(_IMUS[0], VIBRATION.field)
+    if table is None:
+        return None
+    for start, end in runs(table.t, table[VIBRATION.field] > _ORANGE):
+        onset_s = start - _LATE_S
+        before = table.where(inside(flight.aloft, table.t) & (table.t < onset_s))
+        if end - start < _STAYS_S or onset_s > upset_s or not len(before) or np.ptp(before.t) < _STAYS_S:
+            continue
+        usual, value = (float(median(part[VIBRATION.field])) for part in (before, table.between(start, end)))
+        if value > _RISEN * usual:
+            return Finding(
+                kind=VIBRATION.kind,
+                title="vibration that rose in flight",
+                onset_s=onset_s,
+                end_s=end,
+                severity="warning",
+                evidence=f"{value:.2g} m/s^2 in the accelerometers' vibration metric, {usual:.2g} before",
+                source=f"{_IMUS[0]}.{VIBRATION.field}",
+                probability=_TRUE_P,
+            )
+    return None
 
 
 CHECK = Check("vibration", "vibration of the accelerometers, and gyros that are noisy", READS, LIMITS, find)
