@@ -46,6 +46,10 @@ _BY_TITLE: tuple[tuple[str, str], ...] = (
         "all motors were told to stop",
         "find out what stopped the motors: the land detector, a switch or a failsafe, as the messages around it say",
     ),
+    (
+        "the motors lost their power",
+        "check the battery's plug, the power module and the wiring to the motor controllers, under load and shaken",
+    ),
     ("the motor lost thrust", "check the motor, its propeller and its ESC, and the battery under load"),
     (rf"too little thrust|hovering takes|{re.escape(CAME_DOWN)}", _LIFT),
     (re.escape(UNPOWERED), "check that the ESCs have power and that the propellers are fitted"),

@@ -64,7 +64,7 @@ def test_what_is_carried_about_while_it_is_to_lift_has_no_power(amps: float, lea
         one.title
         for one in found(
             vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 3)], failsafe=[(0, 0)]),
-            vehicle_local_position=states(z=[(0, 0.0)], vz=[(0, 0.0), (20, -1.5)]),
+            vehicle_local_position=states(z=[(0, 0.0), (25, -1.5)], vz=[(0, 0.0), (20, -1.5)]),
             vehicle_local_position_setpoint=states(vz=[(0, 0.0), (20, -1.5)]),
             vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, 0.0), (20, -0.8)]}),
             battery_status=states(voltage_v=[(0, 12.0)], current_a=[(0, 0.05), (20, amps)]),
@@ -73,6 +73,42 @@ def test_what_is_carried_about_while_it_is_to_lift_has_no_power(amps: float, lea
         )
     ]
     assert (UNPOWERED in titles) == is_told
+
+
+def test_what_stays_on_the_ground_while_it_is_to_lift_has_no_power() -> None:
+    titles = [
+        one.title
+        for one in found(
+            vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 3)], failsafe=[(0, 0)]),
+            vehicle_local_position=states(z=[(0, 0.0)], vz=[(0, 0.0)]),
+            vehicle_local_position_setpoint=states(vz=[(0, 0.0)]),  # it is asked for no climb
+            vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, 0.0), (20, -0.6)]}),
+            battery_status=states(voltage_v=[(0, 12.0)], current_a=[(0, 0.05), (20, 0.2)]),
+        )
+    ]
+    assert UNPOWERED in titles
+
+
+@pytest.mark.parametrize(
+    ("amps", "felt", "is_told"), [(0.0, 1.0, True), (12.0, 1.0, False), (0.0, 9.8, False)],
+    ids=["it falls without current", "it falls", "it flies"],
+)  # fmt: skip
+def test_motors_that_lose_their_power_in_the_air_are_told(amps: float, felt: float, is_told: bool) -> None:
+    asked = [(0.0, 0.0), (12.0, 0.6), (30.0, 1.0), (32.0, 0.0)]
+    log = MadeLog(
+        {
+            "vehicle_status": states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 2)], failsafe=[(0, 0)],
+                                     vehicle_type=[(0, 1)]),
+            "vehicle_local_position": states(z=[(0, 0.0), (13, -5.0), (32, 0.0)], vz=[(0, 0.0)]),
+            "battery_status": states(voltage_v=[(0, 11.5)], current_a=[(0, 0.3), (12, 18.0), (30, amps), (31, 0.0)]),
+            "actuator_motors": states(**{f"control[{n}]": asked for n in range(4)}),
+            "sensor_combined": states(**{f"accelerometer_m_s2[{n}]": [(0, 0.0)] for n in range(2)},
+                                      **{"accelerometer_m_s2[2]": [(0, -9.8), (30, -felt), (31, -9.8)]}),
+        },
+        parameters={"CA_ROTOR_COUNT": (Setting("CA_ROTOR_COUNT", 4.0, "PARM"),)},
+    )  # fmt: skip
+    titles = [one.title for one in every_finding(examine(Px4Flight(log)).findings)]
+    assert ("the motors lost their power in the air" in titles) == is_told
 
 
 def quaternion(w: float, x: float, name: str = "q") -> dict[str, list[tuple[float, float]]]:
@@ -97,18 +133,24 @@ def test_a_current_that_is_not_measured_tells_of_no_power() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "thrust", "is_told"), [(3.0, 0.0, True), (3.0, -0.5, False), (2.0, 0.0, False)]
+    ("before", "mode", "thrust", "said", "is_told"),
+    [(3.0, 3.0, 0.0, "", True), (3.0, 3.0, -0.5, "", False), (2.0, 2.0, 0.0, "", False), (2.0, 3.0, 0.0, "", True),
+     (2.0, 3.0, -0.13, "Disarmed by auto preflight disarming", True), (2.0, 3.0, -0.13, "Disarmed by RC", False)],
 )  # fmt: skip
-def test_a_mission_that_asks_nothing_of_the_motors_never_began(mode: float, thrust: float, is_told: bool) -> None:
+def test_a_mission_that_is_not_flown_though_it_was_armed_for_it_never_began(
+    before: float, mode: float, thrust: float, said: str, is_told: bool
+) -> None:
     titles = [
         one.title
         for one in found(
-            vehicle_status=states(arming_state=[(0, 1), (10, 2), (20, 1)], nav_state=[(0, mode)], failsafe=[(0, 0)]),
+            vehicle_status=states(arming_state=[(0, 1), (10, 2), (20, 1)], nav_state=[(0, before), (15, mode)],
+                                  failsafe=[(0, 0)]),
+            logged_messages=Table(np.array([20.0]), {"level": np.array(["INFO"]), "message": np.array([said])}),
             vehicle_land_detected=states(landed=[(0, 1)]),
             vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, thrust)]}),
             mission_result=states(finished=[(0, 1)], seq_reached=[(0, -1)], seq_total=[(0, 5)]),
         )
-    ]
+    ]  # fmt: skip
     assert (NOT_BEGUN in titles) == is_told
 
 
@@ -134,13 +176,17 @@ POSITION_MODE, ALTITUDE_MODE = 2, 1
 
 
 @pytest.mark.parametrize(
-    ("intended", "known_s", "is_told"),
-    [(POSITION_MODE, 99.0, True), (POSITION_MODE, 5.0, False), (ALTITUDE_MODE, 99.0, False)],
+    ("intended", "known_s", "knows_attitude", "is_told"),
+    [(POSITION_MODE, 99.0, True, True), (POSITION_MODE, 5.0, True, False), (ALTITUDE_MODE, 99.0, True, False),
+     (POSITION_MODE, 99.0, False, False)],
 )  # fmt: skip
-def test_a_position_mode_without_a_position_is_told(intended: int, known_s: float, is_told: bool) -> None:
+def test_a_position_mode_without_a_position_is_told(
+    intended: int, known_s: float, knows_attitude: bool, is_told: bool
+) -> None:
     flags = states(
         local_position_invalid=[(0, 1), (known_s, 0), (15, 1)] if known_s < 15 else [(0, 1)],
         mode_req_local_position_relaxed=[(0, 1 << POSITION_MODE)],
+        attitude_invalid=[(0, int(not knows_attitude))],
         offboard_control_signal_lost=[(0, 1)],
         mode_req_offboard_signal=[(0, 1 << 14)],
     )
@@ -153,12 +199,13 @@ def test_a_position_mode_without_a_position_is_told(intended: int, known_s: floa
     flight = Px4Flight(MadeLog({"vehicle_status": status, "failsafe_flags": flags}))
     titles = [one.title for one in every_finding(examine(flight).findings)]
     assert (f"Position{NO_POSITION_FOR}" in titles) == is_told
-    assert in_words(flight, 20.0) == ("position" if intended == POSITION_MODE else "")
+    if knows_attitude:
+        assert in_words(flight, 20.0) == ("position" if intended == POSITION_MODE else "")
 
 
 @pytest.mark.parametrize(
     ("rate", "wanted", "thrust", "is_told"),
-    [(-3.5, 1.5, -0.3, True), (-3.5, -1.5, -0.3, False), (-1.0, 1.5, -0.3, False), (-3.5, 1.5, 0.0, False)],
+    [(-3.5, 1.5, -0.3, True), (-3.5, -2.5, -0.3, False), (-1.0, 1.5, -0.3, False), (-3.5, 1.5, 0.0, False)],
 )  # fmt: skip
 def test_a_vehicle_that_spins_against_its_control_is_told(
     rate: float, wanted: float, thrust: float, is_told: bool
@@ -174,6 +221,21 @@ def test_a_vehicle_that_spins_against_its_control_is_told(
         )
     ]
     assert (SPINS in titles) == is_told
+
+
+def test_a_spin_whose_demand_turns_around_with_every_half_turn_is_told() -> None:
+    demand = [(30.0 + 0.9 * n, 2.2 if n % 2 else -2.2) for n in range(8)]
+    titles = [
+        one.title
+        for one in found(
+            vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 14)], failsafe=[(0, 0)]),
+            vehicle_land_detected=states(landed=[(0, 1), (12, 0), (48, 1)]),
+            vehicle_angular_velocity=states(**{"xyz[2]": [(0, 0.0), (30, -3.0), (37, 0.0)]}),
+            vehicle_rates_setpoint=states(yaw=[(0, 0.0), *demand, (37.5, 0.0)]),
+            vehicle_thrust_setpoint=states(**{"xyz[2]": [(0, 0.0), (12, -0.5)]}),
+        )
+    ]
+    assert SPINS in titles
 
 
 def landing_on_the_way() -> Table:
@@ -219,7 +281,8 @@ def leaning(*degrees: tuple[float, float]) -> list[str]:
 
 def test_an_attitude_that_left_its_demand_and_came_back_is_told() -> None:
     off = "the attitude does not follow its demand"
-    assert leaning((25.0, 90.0), (25.6, 0.0), (26.0, -70.0), (26.6, 0.0)) == [off]
+    assert leaning((25.0, 60.0), (25.6, 0.0), (26.0, -70.0), (26.6, 0.0)) == [off]
+    assert leaning((25.0, 110.0), (26.2, 0.0)) == ["it tumbled in the air and caught itself"]
     assert leaning((25.0, 40.0), (25.4, 0.0), (40.0, 40.0), (40.4, 0.0)) == []  # flicks of a stick
     assert leaning((25.0, 90.0)) == ["control was lost"]
 

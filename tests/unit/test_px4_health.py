@@ -277,6 +277,7 @@ def test_vibration_counts_where_it_lasts() -> None:
     assert shaken(25.0, 0.02, 40.0) == [("vibration", "strong vibration", 28.5)]
     assert shaken(0.3, 0.9, 40.0) == [("imu", "noisy gyros", 28.5)]
     assert shaken(9.0, 0.5, 40.0) == []
+    assert shaken(2800.0, 50.0, 40.0) == [], "no sensor measures that"
     assert shaken(80.0, 5.0, 31.0) == [], "a hard landing"
 
 

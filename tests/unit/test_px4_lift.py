@@ -89,6 +89,20 @@ def test_a_flight_that_the_firmware_ended_in_the_air() -> None:
     assert found["no_failsafe"] == (0.0, "a failsafe acted at 40.0 s")
 
 
+@pytest.mark.parametrize(("up_m", "said"), [(0.1, "it never left the ground"), (-6.0, "its height runs off below")])
+def test_a_height_that_runs_off_says_nothing_of_a_take_off(up_m: float, said: str) -> None:
+    took_off = checked(vehicle_local_position=heights(up_m))["took_off"][0]
+    assert isinstance(took_off, Unavailable)
+    assert took_off.reason.startswith(said)
+
+
+@pytest.mark.parametrize(("bit", "fell"), [(1, True), (128, False)], ids=["roll", "imbalanced propeller"])
+def test_what_the_failure_detector_only_advises_of_ends_no_flight(bit: int, fell: bool) -> None:
+    status = states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 2)], failsafe=[(0, 0)],
+                    failure_detector_status=[(0, 0), (30, bit), (31, 0)])  # fmt: skip
+    assert (checked(vehicle_status=status)["no_crash"][0] == 0.0) == fell
+
+
 def test_a_failsafe_is_told_by_what_it_is_about() -> None:
     flags = states(offboard_control_signal_lost=[(0, 0), (39.9, 1)], battery_warning=[(0, 0), (45, 1)])
     found = checked(vehicle_status=TERMINATED, failsafe_flags=flags)

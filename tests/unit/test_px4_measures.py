@@ -150,6 +150,15 @@ def test_a_flight_that_broke_off_knows_what_it_reached() -> None:
     assert not found.all_reached
 
 
+@pytest.mark.parametrize(("mode", "success"), [(2, None), (1, None), (5, 0.0)], ids=["Position", "Altitude", "Return"])
+def test_a_mission_that_a_pilot_took_over_did_not_fail(mode: int, success: float | None) -> None:
+    back = flown()
+    status = {**back["vehicle_status"].columns, "nav_state": steps((0, 4), (5, MISSION), (50, mode))}
+    early = mission(vehicle_status=Table(AT, status), mission_result=back["mission_result"].between(0.0, 45.0))
+    said = value("px4_mission_success", early)
+    assert (said if is_known(said) else None) == success
+
+
 @pytest.mark.parametrize(("told_s", "legs"), [(41.0, 3), (51.0, 2)])
 def test_what_comes_next_on_the_way_home_is_no_part_of_the_mission(told_s: float, legs: int) -> None:
     back = flown()

@@ -55,8 +55,10 @@ SAID_WITHIN_S = 1.0
 
 _ARMED = 2
 """arming_state: 2 has meant armed in every version (vehicle_status.msg)."""
-_GAVE_UP = 0b10001111
-"""failure_detector_status: roll, pitch, height, external and motor (failure_detector_status.msg)."""
+_GAVE_UP = 0b00001111
+"""failure_detector_status: roll, pitch, height and external, which end a flight (failure_detector_status.msg)."""
+BY_STICK = frozenset((0, 1, 2, 6, 8, 10, 15, 16))
+"""Modes that a pilot flies with sticks: manual, altitude, position and their kin (nav_state of vehicle_status.msg)."""
 _IDLE_S = 60.0
 _MARKS = re.compile(r"\x1b?\[\d+m")
 _SPEAKER = re.compile(r"^\[\w+\]\s*")

@@ -175,6 +175,8 @@ def _took_off(flight: Px4Flight, span: Span) -> Value:
     heights = flight.heights(span)
     if heights is not None:
         rise_m = float(heights["height"].max())
+        if rise_m < AIRBORNE_M and float(heights["height"].min()) < -AIRBORNE_M:
+            return Unavailable("its height runs off below where it was armed")
         if rise_m > BARELY_M and _off_the_ground_s(flight, span) > _HOVERS_S:
             return 1.0
         barely = f"it rose no higher than {rise_m:.1f} m" if rise_m > BARELY_M else "it never left the ground"

@@ -36,7 +36,7 @@ _USUAL_S = LIMITS.add("time before a blow", 4.0, "s", "a choice: it holds its us
 _GROUND_M = LIMITS.add("height of the ground around where it was armed", 1.5, "m", "a choice: the barometer drifts")
 _LIES_M = LIMITS.add("movement of what lies on the ground", 0.5, "m", "a choice: the estimator still drifts")
 _LIES_S = LIMITS.add("time after a fall in which it lies", 2.0, "s", "a choice: what catches itself climbs again")
-_FALLING = LIMITS.add("what an accelerometer feels in a fall", 5.0, "m/s^2", "half of gravity; the air brakes the rest")
+FALLING = LIMITS.add("what an accelerometer feels in a fall", 5.0, "m/s^2", "half of gravity; the air brakes the rest")
 _FALL_S = LIMITS.add("shortest fall", 0.15, "s", "half of that from half a metre; a bounce is over sooner")
 _CUT_S = LIMITS.add("time in which it falls without motors", 1.0, "s", "a choice: they stop at once")
 _HANGS_S = LIMITS.add(
@@ -111,8 +111,9 @@ def _struck(flight: Px4Flight) -> Hit | None:
         blow = float(np.max(felt[(table.t >= at) & (table.t <= at + 1.0)]))
         usual = felt[(table.t >= at - _USUAL_S) & (table.t < at - 0.2)]
         is_blow = not len(usual) or blow > _OVER_USUAL * float(np.max(usual))
-        after = felt[(table.t >= at + _LIES_S) & (table.t <= at + 2 * _LIES_S)]
-        lies = len(after) > 2 and float(np.ptp(after)) < _STILL  # though it stays armed, as planes do
+        windows = ((table.t >= at + n * _LIES_S) & (table.t <= at + (n + 1) * _LIES_S) for n in (1, 2))
+        parts = (felt[window] for window in windows)  # it may bounce first, and stay armed, as planes do
+        lies = any(len(part) > 2 and float(np.ptp(part)) < _STILL for part in parts)
         if speed > _HIT_MS and is_blow and (lies or _ends_after(flight, at)):
             return Hit(at, speed, blow, at - _FALLS_S)
     return None
@@ -135,7 +136,7 @@ def falls_after(flight: Px4Flight, cut_s: float) -> bool | None:
     if soon is None or len(soon) < 3 * _CUT_S / _FALL_S:
         return None
     force = np.sqrt(sum(soon[name] ** 2 for name in FORCES))
-    return any(end - start >= _FALL_S for start, end in runs(soon.t, force < _FALLING))
+    return any(end - start >= _FALL_S for start, end in runs(soon.t, force < FALLING))
 
 
 def leans_over_deg(flight: Px4Flight, cut_s: float) -> float | None:

@@ -17,6 +17,7 @@ READS: Wanted = upset.READS
 LIMITS = Limits()
 _LASTS_S = LIMITS.add("shortest time off its demand, all in all", 1.0, "s", "a choice: flicks of a stick take less")
 _CALM_S = LIMITS.add("pause that parts two such times", 5.0, "s", "a choice: what swings leaves it in turn")
+_TUMBLES_DEG = LIMITS.add("off its demand in a tumble", 75.0, "deg", "a choice: no stick and no gust leads there")
 _OFF_P = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
 
 
@@ -32,12 +33,13 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
         return
     start, end = left[0][0], left[-1][1]
     most = float(np.nanmax(lean.error_deg[(lean.t >= start) & (lean.t <= end)]))
+    tumbled = most > _TUMBLES_DEG
     yield Finding(
         kind="attitude",
-        title="the attitude does not follow its demand",
+        title="it tumbled in the air and caught itself" if tumbled else "the attitude does not follow its demand",
         onset_s=start,
         end_s=end,
-        severity="warning",
+        severity="critical" if tumbled else "warning",
         evidence=f"up to {most:.0f} degrees off it (limit {upset.LEFT_DEG:g}) in {end - start:.1f} s; it came back",
         source="vehicle_attitude, vehicle_attitude_setpoint",
         probability=_OFF_P,

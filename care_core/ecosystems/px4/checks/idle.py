@@ -14,7 +14,7 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import NO_MISSION, NOT_BEGUN, Finding
-from care_core.ecosystems.px4.flight import LANDED, MESSAGES, RESULT, Px4Flight
+from care_core.ecosystems.px4.flight import LANDED, MESSAGES, RESULT, SAID_WITHIN_S, Px4Flight
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
@@ -28,6 +28,7 @@ READS: Wanted = {
     MESSAGES: ("message",),
 }
 _NO_MISSION = re.compile(r"no valid mission available", re.IGNORECASE)
+_GAVE_UP = re.compile(r"auto preflight disarm", re.IGNORECASE)
 LIMITS = Limits()
 _IDLES = LIMITS.add("thrust that is asked for on the ground", 0.1, "", "MPC_THR_MIN is 0.12 as shipped")
 _WAITS_S = LIMITS.add("shortest time armed", 3.0, "s", "a choice: COM_SPOOLUP_TIME is 1 s as shipped, and margin")
@@ -37,28 +38,36 @@ _SURE_P = LIMITS.add("probability that it was not begun", 0.9, "", "nothing was 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     """One finding for the first time that it was armed for a mission and flew none of it."""
     for span in flight.armed if flight.hovers else ():
-        refused = _refused(flight, span)
-        if refused is not None:
-            yield refused
+        found = _refused(flight, span) or _waited(flight, span)
+        if found is not None:
+            yield found
             return
-        ways = {way_of("px4", mode) for mode in flight.modes_during(span)}
-        asked = _most_asked(flight, span)
-        stays = flight.during(LANDED, "landed", span) is not None and not flight.ever(LANDED, "landed", 0, span)
-        if ways == {"mission"} and asked is not None and asked < _IDLES and stays and span[1] - span[0] > _WAITS_S:
-            done = flight.ever(RESULT, "finished", 1, span) and not flight.at_least(RESULT, "seq_reached", 0, span)
-            yield Finding(
-                kind="software",
-                title=NOT_BEGUN,
-                onset_s=span[0],
-                end_s=span[1],
-                severity="critical",
-                evidence=f"armed in mode Mission for {span[1] - span[0]:.0f} s on the ground, no thrust was asked for"
-                + ("; the navigator calls the mission finished: upload it again, or start it anew" if done else ""),
-                source=f"{LANDED}, {_THRUST}, {RESULT}",
-                suspect="operation",
-                probability=_SURE_P,
-            )
-            return
+
+
+def _waited(flight: Px4Flight, span: Span) -> Finding | None:
+    """A mission that was last in force, on the ground: without thrust, or until the firmware gave up."""
+    modes = flight.modes_during(span)
+    stays = flight.during(LANDED, "landed", span) is not None and not flight.ever(LANDED, "landed", 0, span)
+    if not stays or not modes or way_of("px4", modes[-1]) != "mission" or span[1] - span[0] < _WAITS_S:
+        return None
+    asked = _most_asked(flight, span)
+    gave_up = any(_GAVE_UP.search(text) for t, _, text in flight.messages if abs(t - span[1]) < SAID_WITHIN_S)
+    if not gave_up and (asked is None or asked >= _IDLES):
+        return None
+    why = "until the firmware gave up" if gave_up else "no thrust was asked for"
+    done = flight.ever(RESULT, "finished", 1, span) and not flight.at_least(RESULT, "seq_reached", 0, span)
+    again = "; the navigator calls the mission finished: upload it again, or start it anew" if done else ""
+    return Finding(
+        kind="software",
+        title=NOT_BEGUN,
+        onset_s=span[0],
+        end_s=span[1],
+        severity="critical",
+        evidence=f"armed for {span[1] - span[0]:.0f} s on the ground, at last in mode Mission: {why}{again}",
+        source=f"{LANDED}, {_THRUST}, {RESULT}, {MESSAGES}",
+        suspect="operation",
+        probability=_SURE_P,
+    )
 
 
 def _refused(flight: Px4Flight, span: Span) -> Finding | None:

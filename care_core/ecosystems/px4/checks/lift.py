@@ -49,6 +49,7 @@ _NEAR_LEAST = LIMITS.add("thrust near the least", 0.02, "", "a choice: it is rou
 _LIFTS = LIMITS.add("thrust that lifts", 0.4, "", "a choice: what hovers with less has power to spare")
 _DRAWS_W = LIMITS.add("power of a vehicle that lifts", 5.0, "W", "the lightest quadcopter, of 30 g, hovers with 7 W")
 _LOOSE_DEG = LIMITS.add("attitude error that no motor holds", 15.0, "deg", "a choice: what flies holds it by far")
+_STANDS_M = LIMITS.add("movement of what stands on the ground", 0.5, "m", "a choice: the estimator still drifts")
 _FOR_A_WHILE = LIMITS.add("share of the time in which it draws as little", 0.9, "", "a choice: a current is noisy")
 _MEASURED_A = LIMITS.add("change of a current that is measured", 0.02, "A", "a choice: what is not measured stays")
 _FEWEST = 10
@@ -84,7 +85,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     lacking = list(_at_its_end(flight, all_of_it, "too little thrust", "all the thrust"))
     drawn_w = drawn_while_lifting(flight)
     if drawn_w is not None:
-        yield from _unpowered(flight, lacking or _lifts(flight, t, lift), drawn_w)
+        yield from _unpowered(flight, lacking or _lifts(flight, t, lift) or _stands(flight, t, lift), drawn_w)
     else:
         yield from (_set(flight, one, "MPC_THR_MAX", -1.0) for one in lacking)
     for one in _at_its_end(
@@ -140,6 +141,18 @@ def _lifts(flight: Px4Flight, t: Floats, lift: Floats) -> list[Finding]:
         return []
     what = f"thrust of {_LIFTS:.0%} and more is asked for from {log_time(flown[0][0])} on, and it does not lean as told"
     return [_finding("too little thrust", (flown[0][0], flown[-1][1]), what)]
+
+
+def _stands(flight: Px4Flight, t: Floats, lift: Floats) -> list[Finding]:
+    """Where it is asked for thrust that lifts, and stays where it stands."""
+    for start, end in runs(t, lift > _LIFTS):
+        heights = flight.heights((start, end))
+        if end - start >= _LASTS_S and heights is not None and np.ptp(heights["height"]) < _STANDS_M:
+            what = (
+                f"thrust of {_LIFTS:.0%} and more is asked for from {log_time(start)} on, and it stays on the ground"
+            )
+            return [_finding("too little thrust", (start, end), what)]
+    return []
 
 
 def _unpowered(flight: Px4Flight, lacking: Iterable[Finding], drawn_w: float) -> Iterator[Finding]:

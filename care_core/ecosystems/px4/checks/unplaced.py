@@ -12,7 +12,7 @@ from care_core.ecosystems.px4.flight import FLAGS, SAID_WITHIN_S, STATUS, Px4Fli
 from care_core.ecosystems.vehicles import mode_name
 from care_core.logs.base import Wanted, merge_needs
 
-READS: Wanted = merge_needs((failsafes.READS, {STATUS: ("failsafe",)}))
+READS: Wanted = merge_needs((failsafes.READS, {STATUS: ("failsafe",), FLAGS: ("attitude_invalid",)}))
 LIMITS = Limits()
 _SURE_P = LIMITS.add("probability that the mode was the mistake", 0.9, "", "the firmware's own flags, up all along")
 _UNKNOWN = {"local_position_invalid": "no local position", "global_position_invalid": "no global position"}
@@ -29,6 +29,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
             words
             for flag, words in _UNKNOWN.items()
             if flight.last(FLAGS, flag, acted_s) == 1
+            and flight.last(FLAGS, "attitude_invalid", acted_s) != 1  # what lacks that lacks more than a position
             and not flight.ever(FLAGS, flag, 0, (-math.inf, acted_s + SAID_WITHIN_S))
             and failsafes.matters(flight, flag, acted_s)
         ]

@@ -44,16 +44,20 @@ class _Metric(Record):
     what: str
     unit: str
     limit: float
+    most: float
+    """What no such sensor measures."""
 
 
 VIBRATION = _Metric(
     "accel_vibration_metric", "vibration", "strong vibration", "accelerometers", "m/s^2",
     LIMITS.add("vibration of an accelerometer", 9.81, "m/s^2", "Flight Review draws it red from there"),
+    LIMITS.add("vibration that no accelerometer measures", 300.0, "m/s^2", "sensors end at 16 or 32 g"),
 )  # fmt: skip
 METRICS = (
     VIBRATION,
     _Metric("gyro_vibration_metric", "imu", "noisy gyros", "gyros", "rad/s",
-            LIMITS.add("vibration of a gyro", 0.6, "rad/s", "a rough quadcopter of a maker is above 0.5 at times")),
+            LIMITS.add("vibration of a gyro", 0.6, "rad/s", "a rough quadcopter of a maker is above 0.5 at times"),
+            LIMITS.add("vibration that no gyro measures", 40.0, "rad/s", "sensors end at 2000 deg/s")),
 )  # fmt: skip
 READS: Wanted = merge_needs(({imu: tuple(metric.field for metric in METRICS) for imu in _IMUS}, upset.READS))
 
@@ -75,7 +79,7 @@ def _shaken(flight: Px4Flight, imu: str, metric: _Metric, upset_s: float) -> Fin
     table = flight.table(imu, metric.field)
     if table is None:
         return None
-    spans = runs(table.t, table[metric.field] > metric.limit)
+    spans = runs(table.t, (table[metric.field] > metric.limit) & (table[metric.field] < metric.most))
     lasting = [(start, end) for start, end in spans if end - start >= _LASTS_S and start - _LATE_S <= upset_s]
     if not lasting:
         return None

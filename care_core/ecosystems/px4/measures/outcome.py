@@ -9,7 +9,7 @@ import numpy as np
 from care_core.ecosystems.coverage import SUM, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, has, one_of
 from care_core.ecosystems.px4 import failsafes, upset
-from care_core.ecosystems.px4.flight import MESSAGES, RESULT, STATUS
+from care_core.ecosystems.px4.flight import BY_STICK, MESSAGES, RESULT, STATUS
 from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.px4.measures.flown import NEEDS, flown_mission, is_armed
 from care_core.ecosystems.px4.measures.requested import flight_of
@@ -116,7 +116,7 @@ def _flown_whole(mission: Mission) -> Value:
     if not flown.all_reached:
         flight, span = flight_of(mission), (mission.start_s, mission.end_s)
         last = next(reversed(flight.modes_during(span)), None)
-        if last is not None and way_of("px4", last) == "manual":  # what somebody broke off did not fail
+        if last in BY_STICK:  # what somebody broke off did not fail
             return Unavailable(f"the mission was not flown to its end, the last mode was {mode_name('px4', last)}")
         return mission_outcome(flight, span) if flown.items is None else 0.0
     off_m = landing_error(mission, {})
