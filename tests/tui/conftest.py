@@ -160,7 +160,7 @@ def _is_under_way(app: object) -> bool:
     if app.workspace.request is not None and app.workspace.folder is None and state in ("empty", "loading"):
         return True
     screen = app.screen
-    page = screen.page if isinstance(screen, CaseScreen) and not screen.query_one("#too-small").display else None
-    return bool(app._batch_count) or (
-        page is not None and page.FITS and state in ("error", "data") and not page.reader.plain
-    )
+    if not isinstance(screen, CaseScreen) or screen.query_one("#too-small").display:
+        return bool(app._batch_count)
+    says = state in ("error", "data") or (state == "empty" and screen.here != "logs")
+    return bool(app._batch_count) or (screen.page.FITS and says and not screen.page.reader.plain)

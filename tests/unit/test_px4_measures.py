@@ -164,7 +164,7 @@ def test_what_comes_next_on_the_way_home_is_no_part_of_the_mission(told_s: float
     back = flown()
     status = {**back["vehicle_status"].columns, "nav_state": steps((0, 4), (5, MISSION), (50, BACK))}
     ground = (*HOME[:2], 0.0)  # a return names the place where it lands without its height
-    rows = [(41.0, 0.0, math.nan, math.nan, 0.0), (told_s, 1.0, *ground)]
+    rows: list[tuple[float, ...]] = [(41.0, 0.0, math.nan, math.nan, 0.0), (told_s, 1.0, *ground)]
     early = mission(
         vehicle_status=Table(AT, status),
         navigator_mission_item=back["navigator_mission_item"].between(0.0, 45.0),

@@ -148,9 +148,7 @@ def _stands(flight: Px4Flight, t: Floats, lift: Floats) -> list[Finding]:
     for start, end in runs(t, lift > _LIFTS):
         heights = flight.heights((start, end))
         if end - start >= _LASTS_S and heights is not None and np.ptp(heights["height"]) < _STANDS_M:
-            what = (
-                f"thrust of {_LIFTS:.0%} and more is asked for from {log_time(start)} on, and it stays on the ground"
-            )
+            what = f"thrust of {_LIFTS:.0%} and more is asked for from {log_time(start)} on, and it stays on the ground"
             return [_finding("too little thrust", (start, end), what)]
     return []
 
