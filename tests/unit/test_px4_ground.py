@@ -135,7 +135,8 @@ def test_a_current_that_is_not_measured_tells_of_no_power() -> None:
 @pytest.mark.parametrize(
     ("before", "mode", "thrust", "said", "is_told"),
     [(3.0, 3.0, 0.0, "", True), (3.0, 3.0, -0.5, "", False), (2.0, 2.0, 0.0, "", False), (2.0, 3.0, 0.0, "", True),
-     (2.0, 3.0, -0.13, "Disarmed by auto preflight disarming", True), (2.0, 3.0, -0.13, "Disarmed by RC", False)],
+     (2.0, 3.0, -0.13, "Disarmed by auto preflight disarming", True), (2.0, 3.0, -0.13, "Disarmed by RC", False),
+     (3.0, 3.0, -0.15, "Disarmed by auto preflight disarming", False)],
 )  # fmt: skip
 def test_a_mission_that_is_not_flown_though_it_was_armed_for_it_never_began(
     before: float, mode: float, thrust: float, said: str, is_told: bool
@@ -143,7 +144,7 @@ def test_a_mission_that_is_not_flown_though_it_was_armed_for_it_never_began(
     titles = [
         one.title
         for one in found(
-            vehicle_status=states(arming_state=[(0, 1), (10, 2), (20, 1)], nav_state=[(0, before), (15, mode)],
+            vehicle_status=states(arming_state=[(0, 1), (10, 2), (20, 1)], nav_state=[(0, before), (18, mode)],
                                   failsafe=[(0, 0)]),
             logged_messages=Table(np.array([20.0]), {"level": np.array(["INFO"]), "message": np.array([said])}),
             vehicle_land_detected=states(landed=[(0, 1)]),

@@ -28,7 +28,7 @@ READS: Wanted = {
     MESSAGES: ("message",),
 }
 _NO_MISSION = re.compile(r"no valid mission available", re.IGNORECASE)
-_GAVE_UP = re.compile(r"auto preflight disarm", re.IGNORECASE)
+_GIVEN_UP = re.compile(r"auto preflight disarm", re.IGNORECASE)
 LIMITS = Limits()
 _IDLES = LIMITS.add("thrust that is asked for on the ground", 0.1, "", "MPC_THR_MIN is 0.12 as shipped")
 _WAITS_S = LIMITS.add("shortest time armed", 3.0, "s", "a choice: COM_SPOOLUP_TIME is 1 s as shipped, and margin")
@@ -45,16 +45,18 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
 
 
 def _waited(flight: Px4Flight, span: Span) -> Finding | None:
-    """A mission that was last in force, on the ground: without thrust, or until the firmware gave up."""
+    """A mission that was last in force, on the ground: without thrust, or so late that the firmware gave up at once."""
     modes = flight.modes_during(span)
     stays = flight.during(LANDED, "landed", span) is not None and not flight.ever(LANDED, "landed", 0, span)
     if not stays or not modes or way_of("px4", modes[-1]) != "mission" or span[1] - span[0] < _WAITS_S:
         return None
     asked = _most_asked(flight, span)
-    gave_up = any(_GAVE_UP.search(text) for t, _, text in flight.messages if abs(t - span[1]) < SAID_WITHIN_S)
-    if not gave_up and (asked is None or asked >= _IDLES):
+    begun_s = max(t for t, _ in flight.modes if t <= span[1])
+    given_up = any(_GIVEN_UP.search(text) for t, _, text in flight.messages if abs(t - span[1]) < SAID_WITHIN_S)
+    is_late = given_up and begun_s > span[1] - _WAITS_S
+    if not is_late and (asked is None or asked >= _IDLES):
         return None
-    why = "until the firmware gave up" if gave_up else "no thrust was asked for"
+    why = "the firmware gave up before it could begin" if is_late else "no thrust was asked for"
     done = flight.ever(RESULT, "finished", 1, span) and not flight.at_least(RESULT, "seq_reached", 0, span)
     again = "; the navigator calls the mission finished: upload it again, or start it anew" if done else ""
     return Finding(
