@@ -1,11 +1,14 @@
 """Does the profile travel? Missions, vehicles and sites that training never saw, beside a plain classifier.
 
     python -m benchmarks.travel --shared DIR --table arducopter.parquet [--platform NAME] [--profiles DIR] [--folds N]
+    python -m benchmarks.travel --platform px4 --unseen
 
-Two parts. *Missions left out whole*: the table (`benchmarks.tools.train_profiles --tables`) is split by mission; each
-part is predicted by a model of the others: time and energy with their intervals, what the reference configuration needs
-for the mission (against the flight that flew it), and the probability that all objectives are met. *Faults*: failed
-flights of other settings, whose resets were flown: causes, fixes, and the probabilities promised for each reset.
+With `--unseen` the profile itself is held against the flights of `benchmarks/unseen`, of vehicles and missions that it
+was not learned from. Else two parts. *Missions left out whole*: the table (`benchmarks.tools.train_profiles --tables`)
+is split by mission; each part is predicted by a model of the others: time and energy with their intervals, what the
+reference configuration needs for the mission (against the flight that flew it), and the probability that all
+objectives are met. *Faults*: failed flights of other settings, whose resets were flown: causes, fixes, and the
+probabilities promised for each reset.
 
 The plain classifier (extremely randomised trees averaged with gradient boosting) reads the same options and contexts,
 and is given the same abduction.
@@ -51,6 +54,8 @@ from care_core.records import Struct, field
 
 EFFORT = Effort(points=500, iterations=40, folds=5)
 MEASURED = ("mission_time", "energy")
+UNSEEN = Path(__file__).parent / "unseen"
+"""Tables of runs that no profile was learned from."""
 APART = {
     "arducopter": (
         "path_length", "legs", "hold_time", "commanded_speed", "takeoff_height", "return_distance", "hover_power",
@@ -154,7 +159,7 @@ def _predict(frame: pd.DataFrame, schema: Schema, test: Bools) -> LeftOut:
 
 def _asked(
     model: Model, schema: Schema, rows: pd.DataFrame, filled: pd.DataFrame, flown: Mapping[str, Floats],
-    peer: PlainClassifier, distance: Floats,
+    peer: PlainClassifier | None, distance: Floats,
 ) -> LeftOut:  # fmt: skip
     n = len(rows)
     error, inside, need_error, need_inside = ({name: np.full(n, np.nan) for name in measured(schema)} for _ in range(4))
@@ -171,7 +176,8 @@ def _asked(
     reference = {v.name: v.default for v in schema.options if v.default is not None}
     named = filled[[*schema.variables]]  # a table may tell the day as well
     configs = [{str(k): float(v) for k, v in row.items()} for row in named.to_dict("records")]
-    found.plain[:] = peer.probability(configs)
+    if peer is not None:
+        found.plain[:] = peer.probability(configs)
     for i, config in enumerate(configs):
         there = {**config, **reference}
         before = CounterfactualQuery(model, config, {}, {})
@@ -234,6 +240,25 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
         print(f"    {name:9}  met    n")
         for p, seen, count in reliability(predicted, truth):
             print(f"    {p:9.2f} {seen:4.2f} {count:4d}")
+
+
+def show_unseen(profile: Profile, frame: pd.DataFrame) -> None:
+    """What the profile itself says of runs that it was not learned from, beside what came of them."""
+    schema = profile.schema
+    filled = frame.fillna({v.name: frame[v.name].median() for v in schema.contexts})
+    flown = {name: needs(schema.variables[name], frame, schema) for name in measured(schema)}
+    found = _asked(profile.model, schema, frame, filled, flown, None, np.zeros(len(frame)))
+    truth = all_met(frame, schema)
+    said = found.predicted
+    print(f"runs that it was not learned from: {len(frame)}, all met in {truth.mean():.2f}, said {said.mean():.2f}; "
+          f"calibration error {calibration_error(said, truth):.3f}, Brier {((said - truth) ** 2).mean():.3f}, "
+          f"by the share alone {truth.mean() * (1 - truth.mean()):.3f}")  # fmt: skip
+    for name in measured(schema):
+        known = np.isfinite(found.error[name])
+        print(f"  {name}: rms {np.sqrt(np.mean(found.error[name][known] ** 2)):.1%}, in its 80 % interval "
+              f"{found.inside[name][known].mean():.0%}, n {known.sum()}")  # fmt: skip
+    for share, seen, count in reliability(said, truth):
+        print(f"    {share:4.2f} {seen:4.2f} {count:4d}")
 
 
 # --- faults whose resets were flown -----------------------------------------------------------------------------
@@ -322,14 +347,21 @@ def show_faults(found: Faults) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--shared", type=Path, required=True, help="folder that holds data/")
-    parser.add_argument("--table", type=Path, required=True, help="runs of the profile's training")
+    parser.add_argument("--shared", type=Path, help="folder that holds data/")
+    parser.add_argument("--table", type=Path, help="runs of the profile's training")
+    parser.add_argument("--unseen", action="store_true", help="hold the profile against benchmarks/unseen alone")
     parser.add_argument("--platform", choices=sorted(FAULTS), default="arducopter", help="default: arducopter")
     parser.add_argument("--profiles", type=Path, help="folder of profiles to judge; default: the bundled ones")
     parser.add_argument("--folds", type=int, default=5, help="parts of the missions; 0 leaves this out")
     args = parser.parse_args()
     profile = load_profile(args.platform if args.profiles is None else args.profiles / args.platform)
     schema = profile.schema
+    if args.unseen:
+        frame = read_table(UNSEEN / f"{schema.name}.csv", schema)[list(schema.variables)]
+        show_unseen(profile, frame)
+        return
+    if args.shared is None or args.table is None:
+        parser.error("give --shared and --table, or --unseen")
     frame = read_table(args.table, schema)[list(schema.variables)]
     inputs = [v.name for v in (*schema.options, *schema.contexts)]
     filled = frame.fillna({v.name: frame[v.name].median() for v in schema.contexts})
