@@ -162,5 +162,8 @@ def _is_under_way(app: object) -> bool:
     screen = app.screen
     if not isinstance(screen, CaseScreen) or screen.query_one("#too-small").display:
         return bool(app._batch_count)
+    page = screen.page
     says = state in ("error", "data") or (state == "empty" and screen.here != "logs")
-    return bool(app._batch_count) or (screen.page.FITS and says and not screen.page.reader.plain)
+    cursor = (page.choices.highlighted or 0) * page.choices.listing.height  # a list scrolls to it once it was laid out
+    is_seen = not page.choices.display or page.choices.top <= cursor < page.choices.top + page.choices.room.height
+    return bool(app._batch_count) or not is_seen or (page.FITS and says and not page.reader.plain)
