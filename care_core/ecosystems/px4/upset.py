@@ -11,8 +11,8 @@ from care_core.ecosystems.base import Limits
 from care_core.ecosystems.px4 import attitude
 from care_core.ecosystems.px4.flight import LANDED, POSITION, ROTARY, STATUS, Px4Flight
 from care_core.ecosystems.spans import runs
-from care_core.logs.base import Wanted, merge_needs
-from care_core.numbers import Bools
+from care_core.logs.base import Table, Wanted, merge_needs
+from care_core.numbers import Bools, Floats
 
 COMBINED = "sensor_combined"
 FORCES = tuple(f"accelerometer_m_s2[{n}]" for n in range(3))
@@ -69,6 +69,11 @@ class Lost(NamedTuple):
     """How far off its demand it came."""
 
 
+def force_of(felt: Table) -> Floats:
+    """What the accelerometers feel in all, m/s^2."""
+    return np.asarray(np.sqrt(sum(felt[name] ** 2 for name in FORCES)))
+
+
 def hit(flight: Px4Flight) -> Hit | None:
     """The first time that it hit the ground at speed: a fast descent that ended the flight, with a blow, or near the
     height at which it was armed."""
@@ -99,7 +104,7 @@ def _struck(flight: Px4Flight) -> Hit | None:
     table, position = flight.table(COMBINED, *FORCES), flight.table(POSITION, "z")
     if table is None or position is None:
         return None
-    felt = np.sqrt(sum(table[name] ** 2 for name in FORCES))
+    felt = force_of(table)
     known = np.isfinite(position["z"])
     if not known.any():
         return None
@@ -135,7 +140,7 @@ def falls_after(flight: Px4Flight, cut_s: float) -> bool | None:
     soon = None if table is None else table.between(cut_s, cut_s + _CUT_S)
     if soon is None or len(soon) < 3 * _CUT_S / _FALL_S:
         return None
-    force = np.sqrt(sum(soon[name] ** 2 for name in FORCES))
+    force = force_of(soon)
     return any(end - start >= _FALL_S for start, end in runs(soon.t, force < FALLING))
 
 

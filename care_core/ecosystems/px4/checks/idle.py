@@ -59,17 +59,8 @@ def _waited(flight: Px4Flight, span: Span) -> Finding | None:
     why = "the firmware gave up before it could begin" if is_late else "no thrust was asked for"
     done = flight.ever(RESULT, "finished", 1, span) and not flight.at_least(RESULT, "seq_reached", 0, span)
     again = "; the navigator calls the mission finished: upload it again, or start it anew" if done else ""
-    return Finding(
-        kind="software",
-        title=NOT_BEGUN,
-        onset_s=span[0],
-        end_s=span[1],
-        severity="critical",
-        evidence=f"armed for {span[1] - span[0]:.0f} s on the ground, at last in mode Mission: {why}{again}",
-        source=f"{LANDED}, {_THRUST}, {RESULT}, {MESSAGES}",
-        suspect="operation",
-        probability=_SURE_P,
-    )
+    evidence = f"armed for {span[1] - span[0]:.0f} s on the ground, at last in mode Mission: {why}{again}"
+    return _finding(NOT_BEGUN, span, evidence, f"{LANDED}, {_THRUST}, {RESULT}, {MESSAGES}")
 
 
 def _refused(flight: Px4Flight, span: Span) -> Finding | None:
@@ -78,14 +69,19 @@ def _refused(flight: Px4Flight, span: Span) -> Finding | None:
     first = next(said, None)
     if first is None or flight.at_least(RESULT, "seq_reached", 0, span):
         return None
+    evidence = f"the firmware says: {first[1]}; upload the mission again, or start it anew"
+    return _finding(NO_MISSION, (first[0], span[1]), evidence, f"{MESSAGES}, {RESULT}")
+
+
+def _finding(title: str, span: Span, evidence: str, source: str) -> Finding:
     return Finding(
         kind="software",
-        title=NO_MISSION,
-        onset_s=first[0],
+        title=title,
+        onset_s=span[0],
         end_s=span[1],
         severity="critical",
-        evidence=f"the firmware says: {first[1]}; upload the mission again, or start it anew",
-        source=f"{MESSAGES}, {RESULT}",
+        evidence=evidence,
+        source=source,
         suspect="operation",
         probability=_SURE_P,
     )

@@ -33,7 +33,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     t, amps = battery.t, np.nan_to_num(battery["current_a"])
     hardest = np.interp(t, asked.t, np.nan_to_num(asked.share.max(axis=0)))
     lifts = inside(flight.armed, t) & (hardest > _ASKS) & (t < min(flight.kills, default=np.inf))
-    force = np.sqrt(sum(felt[name] ** 2 for name in upset.FORCES))
+    force = upset.force_of(felt)
     for since, until in runs(t, lifts & (amps < _NOTHING)):
         falls = force[(felt.t >= since) & (felt.t <= since + _SOON_S)]
         before = amps[(t < since) & (t >= since - _SOON_S)]

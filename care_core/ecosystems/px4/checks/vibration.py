@@ -68,10 +68,10 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     for metric in METRICS:
         found = (_shaken(flight, imu, metric, upset_s) for imu in _IMUS)
         first = min((one for one in found if one is not None), key=lambda one: one.onset_s, default=None)
+        if first is None and metric is VIBRATION:
+            first = _risen(flight, upset_s)
         if first is not None:
             yield first
-        elif metric is VIBRATION:
-            yield from filter(None, [_risen(flight, upset_s)])
 
 
 def _shaken(flight: Px4Flight, imu: str, metric: _Metric, upset_s: float) -> Finding | None:
