@@ -56,8 +56,8 @@ SAID_WITHIN_S = 1.0
 _ARMED = 2
 """arming_state: 2 has meant armed in every version (vehicle_status.msg)."""
 _GAVE_UP = 0b00001111
-"""failure_detector_status: roll, pitch, height and external, which end a flight (vehicle_status.msg). 128 is a motor since
-1.14, as failsafe_flags says too, and a propeller that is out of balance before, of which the firmware only advises."""
+"""failure_detector_status: roll, pitch, height and external, which end a flight (vehicle_status.msg). 128 is a motor
+since 1.14, as failsafe_flags says too, and a propeller out of balance before, of which the firmware only advises."""
 BY_STICK = frozenset((0, 1, 2, 6, 8, 10, 15, 16))
 """Modes that a pilot flies with sticks: manual, altitude, position and their kin (nav_state of vehicle_status.msg)."""
 _IDLE_S = 60.0
