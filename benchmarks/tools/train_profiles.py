@@ -89,11 +89,12 @@ SOURCES = {
         "ingest`.",
     ),
     "px4": Source(
-        ("data/px4/table.tar.xz",),
+        (),
         "Missions of the PX4 v1.15.4 firmware in its simulation in hardware (SIH), recorded by this project under "
-        "random configurations and winds: those of 463 flights of 44 settings (mission, vehicle, site) in which no "
-        "hardware failed; ULog files, read by `care ingest`.",
-        hardware="data/px4/table.csv",
+        "random configurations, winds and gusts: 954 flights of 90 settings (mission, vehicle, site), of each the "
+        "reference twice and flights with one to four options off, in 540 of them as failed and with options put back; "
+        "ULog files, read by `care ingest`.",
+        table="px4.csv",
     ),
     "move_base": Source(
         ("data/move_base/train.tar.xz",),
