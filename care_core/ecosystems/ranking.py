@@ -21,6 +21,8 @@ MUCH_SURER = 0.2
 """What is surer by so much, and no consequence of the other, brought about what either may have."""
 OVER_S = 60.0
 """What was over for so long before something began did not bring it about."""
+UNLINKED_S = 30.0
+"""The same, where no finding lies between them that would lead from one to the other."""
 SYMPTOMS: frozenset[FindingKind] = frozenset(("attitude", "crash", "estimator", "log"))
 """What shows that something is wrong, not what: told after causes of the same weight."""
 ON_GROUND: frozenset[FindingKind] = frozenset(("prearm",))
@@ -55,8 +57,8 @@ def rank_findings(
             one for one in left if _belongs(root, one, reach) and not any(_belongs(it, one, reach) for it in surer)
         ]
         led_to = _led_to(root, below, explains)
-        left = [one for one in left if one not in below]
-        others = [one for one in below if one not in led_to]
+        others = [one for one in below if one not in led_to and one.onset_s <= root.end_s + UNLINKED_S]
+        left = [one for one in left if one not in led_to and one not in others]
         told.append(replace(root, consequences=_in_time(led_to), followed_by=_in_time(others)))
     return tuple(sorted(told, key=lambda one: (*_rank(one), not _brought_down(one))))
 

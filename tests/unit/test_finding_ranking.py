@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from care_core.ecosystems.explains import OF_ROVERS, Explains
 from care_core.ecosystems.findings import NO_BATTERY, OWN_SUPPLY, UNCHARGED, Finding, FindingKind, Severity
-from care_core.ecosystems.ranking import OVER_S, SLACK_S, lost_by, rank_findings
+from care_core.ecosystems.ranking import OVER_S, SLACK_S, UNLINKED_S, lost_by, rank_findings
 from care_core.records import replace
 from care_core.report.health import finding_lines
 
@@ -48,6 +48,14 @@ def test_a_step_that_is_missing_leads_to_nothing() -> None:
     (root,) = ranked([finding("laser", 1.0), finding("control", 9.0)])
     assert root.consequences == ()
     assert [(words, [one.kind for one in below]) for words, below in root.links] == [("followed by", ["control"])]
+
+
+def test_without_that_step_what_comes_much_later_is_a_course_of_its_own() -> None:
+    later_s = 2.0 + UNLINKED_S
+    told = ranked([finding("laser", 1.0), finding("control", later_s + 1.0)])
+    assert [(one.kind, one.followed_by) for one in told] == [("laser", ()), ("control", ())]
+    (root,) = ranked([finding("laser", 1.0), finding("planner", later_s), finding("control", later_s + 1.0)])
+    assert [one.kind for one in root.consequences] == ["planner", "control"]
 
 
 @given(st.permutations([("laser", 3.0), ("planner", 2.0), ("control", 4.0)]))

@@ -316,6 +316,37 @@ def test_a_barometer_is_held_against_what_it_was_before_arming() -> None:
     assert heard(0.2) == []
 
 
+@pytest.mark.parametrize(
+    ("poor_s", "accuracy_m", "satellites", "settings", "is_told"),
+    [
+        ((30, 45), 10.8, 10, {}, True),
+        ((30, 45), 0.9, 4, {}, True),
+        ((30, 32), 10.8, 4, {}, False),
+        ((15, 45), 10.8, 4, {}, False),
+        ((30, 45), 4.0, 10, {"EKF2_REQ_EPH": 5.0}, False),
+        ((30, 45), 0.9, 5, {"EKF2_REQ_NSATS": 4.0}, False),
+    ],
+    ids=["accuracy", "satellites", "for a moment", "from its first seconds on", "allowed accuracy", "allowed number"],
+)
+def test_a_receiver_that_was_good_enough_and_is_no_longer(
+    poor_s: tuple[float, float], accuracy_m: float, satellites: int, settings: dict[str, float], is_told: bool
+) -> None:
+    start_s, end_s = poor_s
+    first_s = start_s - (6.0 if start_s < 20 else 25.0)
+    told = states(
+        fix_type=[(first_s, 3)],
+        eph=[(first_s, 0.9), (start_s, accuracy_m), (end_s, 0.9)],
+        satellites_used=[(first_s, 10), (start_s, satellites), (end_s, 10)],
+    )
+    told = told.where(told.t >= first_s)
+    log = MadeLog(
+        {"vehicle_status": FLOWN, "vehicle_gps_position": told},
+        parameters={name: (Setting(name, value, "PARM"),) for name, value in settings.items()},
+    )
+    found = [one for one in examine(Px4Flight(log)).findings if one.kind == "gps"]
+    assert [one.title for one in found] == (["the GPS receiver is no longer good enough to fly by"] if is_told else [])
+
+
 QUAD = {f"CA_ROTOR{n}_P{axis}": at for n, (x, y) in enumerate(((1, 1), (-1, -1), (1, -1), (-1, 1)))
         for axis, at in (("X", float(x)), ("Y", float(y)))} | {"CA_ROTOR_COUNT": 4.0}  # fmt: skip
 
