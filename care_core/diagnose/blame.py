@@ -12,9 +12,13 @@ from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.ranking import Suspect, suspects
 from care_core.diagnose.records import OutsideSuspect
 from care_core.ecosystems.findings import Health
+from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import Record
 from care_core.run import Run, Setting
+
+_REFUSAL = "arming_refused"
+"""How the extraction of a refusal to arm ends, of whatever ecosystem."""
 
 
 class Blame(Record, eq=False):
@@ -55,5 +59,14 @@ def blame(
     outside = suspects_outside(run, broken, health, schema, query, good)
     weights = {one.name: one.weight for one in outside}
     untold = 1.0 - sum(option.name in run.config for option in schema.options) / max(1, len(schema.options))
-    failure = failure_of(query, broken, found, run.refused_by, health.findings, said, weights, untold)
+    idle = _idle(run, schema)
+    failure = failure_of(query, broken, found, run.refused_by, health.findings, said, weights, untold, idle)
     return Blame(run, found, outside, failure)
+
+
+def _idle(run: Run, schema: Schema) -> frozenset[str]:
+    """The options that, by what is known of them, keep a vehicle from arming and do nothing else, where none did."""
+    refusals = {one.name for one in schema.metrics if one.extract is not None and one.extract.kind.endswith(_REFUSAL)}
+    held = {name for name in refusals if run.metrics.get(name) == 0}
+    acts = {option.name: {effect for cause, effect in schema.known if cause == option.name} for option in schema.options}
+    return frozenset(name for name, effects in acts.items() if effects and effects <= held)

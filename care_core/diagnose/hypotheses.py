@@ -98,6 +98,7 @@ def failure_of(
     shown: Mapping[str, Evidence],
     outside: Mapping[str, float] = NONE_OUTSIDE,
     untold: float = 0.0,
+    idle: Container[str] = (),
 ) -> NoisyOr:
     """The causes that may have broken these objectives.
 
@@ -107,6 +108,7 @@ def failure_of(
         shown: by title, the findings that say which options they speak of (`evidence_of_findings`).
         outside: how likely each parameter outside the profile is wrong and loses a mission in this way.
         untold: share of the options whose value is not known.
+        idle: options that could not act in this run, whatever they do in others.
     """
     before = query.before()
     names = [result.variable.name for result in broken]
@@ -118,7 +120,7 @@ def failure_of(
         unlearned = float(before.epistemic_ratio([before.config], names)[0])
         pointed = _pointed_at(found)
         options = {n: _either(q, MISSED.value, unlearned * pointed.get(n, 0.0)) for n, q in options.items()}
-        options = _set_wrong_by(findings, options)
+        options = _set_wrong_by(findings, {n: 0.0 if n in idle else q for n, q in options.items()})
     for finding in (one for one in findings if one.title in shown):
         for option, share in _named_by(finding, shown[finding.title].options, found).items():
             options[option] = _either(options.get(option, 0.0), share)
