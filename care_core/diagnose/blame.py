@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.diagnose.hypotheses import evidence_of_findings, failure_of
+from care_core.diagnose.hypotheses import Arming, evidence_of_findings, failure_of
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.noisy_or import NoisyOr
 from care_core.diagnose.outside import suspects_outside
@@ -59,14 +59,14 @@ def blame(
     outside = suspects_outside(run, broken, health, schema, query, good)
     weights = {one.name: one.weight for one in outside}
     untold = 1.0 - sum(option.name in run.config for option in schema.options) / max(1, len(schema.options))
-    idle = _idle(run, schema)
-    failure = failure_of(query, broken, found, run.refused_by, health.findings, said, weights, untold, idle)
+    arming = Arming(run.refused_by, _idle(run, schema))
+    failure = failure_of(query, broken, found, arming, health.findings, said, weights, untold)
     return Blame(run, found, outside, failure)
 
 
 def _idle(run: Run, schema: Schema) -> frozenset[str]:
     """The options that, by what is known of them, keep a vehicle from arming and do nothing else, where none did."""
     refusals = {one.name for one in schema.metrics if one.extract is not None and one.extract.kind.endswith(_REFUSAL)}
-    held = {name for name in refusals if run.metrics.get(name) == 0}
-    acts = {option.name: {effect for cause, effect in schema.known if cause == option.name} for option in schema.options}
-    return frozenset(name for name, effects in acts.items() if effects and effects <= held)
+    armed = {name for name in refusals if run.metrics.get(name) == 0}
+    acts = {one.name: {effect for cause, effect in schema.known if cause == one.name} for one in schema.options}
+    return frozenset(name for name, effects in acts.items() if effects and effects <= armed)

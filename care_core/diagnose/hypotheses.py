@@ -54,7 +54,7 @@ from care_core.ecosystems.findings import (
 from care_core.ecosystems.ranking import LIKELY, may_refuse
 from care_core.numbers import Floats
 from care_core.profile.schema import Schema
-from care_core.records import replace
+from care_core.records import Record, replace
 from care_core.run import Evidence, FitVerdict
 
 MISSION_LOST: Mapping[Severity, float] = {
@@ -89,26 +89,32 @@ def evidence_of_findings(
     return {title: evidence for title, evidence in said.items() if evidence.options}
 
 
+class Arming(Record):
+    """What options had to do with whether it armed."""
+
+    refused_by: frozenset[str]
+    """Those that the check reads which refused this mission: they explain it whole."""
+    idle: frozenset[str]
+    """Those that can do nothing but keep it from arming, where nothing did: they explain nothing."""
+
+
 def failure_of(
     query: CounterfactualQuery,
     broken: Sequence[ObjectiveResult],
     found: Mapping[str, Sequence[Suspect]],
-    refused: Container[str],
+    arming: Arming,
     findings: Sequence[Finding],
     shown: Mapping[str, Evidence],
     outside: Mapping[str, float] = NONE_OUTSIDE,
     untold: float = 0.0,
-    idle: Container[str] = (),
 ) -> NoisyOr:
     """The causes that may have broken these objectives.
 
     Args:
         found: per objective the options that may have moved it, with their weights.
-        refused: options that the check reads which refused this mission: they explain it whole.
         shown: by title, the findings that say which options they speak of (`evidence_of_findings`).
         outside: how likely each parameter outside the profile is wrong and loses a mission in this way.
         untold: share of the options whose value is not known.
-        idle: options that could not act in this run, whatever they do in others.
     """
     before = query.before()
     names = [result.variable.name for result in broken]
@@ -120,11 +126,12 @@ def failure_of(
         unlearned = float(before.epistemic_ratio([before.config], names)[0])
         pointed = _pointed_at(found)
         options = {n: _either(q, MISSED.value, unlearned * pointed.get(n, 0.0)) for n, q in options.items()}
-        options = _set_wrong_by(findings, {n: 0.0 if n in idle else q for n, q in options.items()})
+        options = _set_wrong_by(findings, {n: 0.0 if n in arming.idle else q for n, q in options.items()})
     for finding in (one for one in findings if one.title in shown):
         for option, share in _named_by(finding, shown[finding.title].options, found).items():
             options[option] = _either(options.get(option, 0.0), share)
-    options.update({one.option: REFUSING.value for group in found.values() for one in group if one.option in refused})
+    suspected = {one.option for group in found.values() for one in group}
+    options.update(dict.fromkeys(sorted(suspected & arming.refused_by), REFUSING.value))
     causes: dict[Key, float] = {("parameter", name): q for name, q in {**outside, **options}.items()}
     return NoisyOr(
         {
