@@ -344,7 +344,7 @@ def test_a_receiver_that_was_good_enough_and_is_no_longer(
         parameters={name: (Setting(name, value, "PARM"),) for name, value in settings.items()},
     )
     found = [one for one in examine(Px4Flight(log)).findings if one.kind == "gps"]
-    assert [one.title for one in found] == (["the GPS receiver is no longer good enough to fly by"] if is_told else [])
+    assert [one.title for one in found] == (["GPS reception became poor"] if is_told else [])
 
 
 QUAD = {f"CA_ROTOR{n}_P{axis}": at for n, (x, y) in enumerate(((1, 1), (-1, -1), (1, -1), (-1, 1)))

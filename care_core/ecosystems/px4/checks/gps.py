@@ -45,7 +45,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     off_m, good_m = (float(median(np.nan_to_num(accuracy_m[rows]))) for rows in (during, before))
     yield Finding(
         kind="gps",
-        title="the GPS receiver is no longer good enough to fly by",
+        title="GPS reception became poor",
         onset_s=span[0],
         end_s=span[1],
         severity="warning",
