@@ -50,6 +50,13 @@ def test_a_flight_in_loiter_is_no_mission_and_has_checks_of_its_own() -> None:
     }  # fmt: skip
 
 
+def test_a_rover_of_another_firmware_is_not_asked_whether_it_landed() -> None:
+    found = checks(flown({"vehicle": "rover"}, mode=0))
+    assert "took_off" not in found
+    assert "landed" not in found
+    assert found["disarmed"] == 1.0
+
+
 def test_a_flown_mission_has_none() -> None:
     mission = flown(mode=3)
     assert value(mission, "mission_success") == 1.0

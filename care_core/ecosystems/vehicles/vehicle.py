@@ -50,11 +50,12 @@ _SUB_FRAMES = {
 
 
 _GROUNDED = frozenset(("rover", "sub", "tracker"))
+_GROUNDED_TYPES = frozenset(("rover", "boat", "submarine"))
 
 
-def flies(kind: Kind) -> bool:
-    """Whether a vehicle leaves the ground; one that is unknown may."""
-    return kind not in _GROUNDED
+def flies(kind: Kind, type: str = "") -> bool:
+    """Whether a vehicle leaves the ground; one that is unknown may, unless its log says of what type it is."""
+    return kind not in _GROUNDED and type not in _GROUNDED_TYPES
 
 
 def is_simulated(facts: Mapping[str, str], settings: Driven) -> bool:

@@ -91,7 +91,8 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Out
     crashed = bool(crash)
     yield OutcomeCheck("armed", 1.0, "the vehicle armed")
     kind = flight_of(mission).mode_kind
-    if flies(kind):
+    leaves = flies(kind, flight_of(mission).log.facts.get("vehicle", ""))
+    if leaves:
         yield OutcomeCheck(
             "took_off", _took_off(mission, crashed=crashed), "it left the ground", "it never left the ground"
         )
@@ -108,7 +109,7 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Out
     yield OutcomeCheck("no_crash", no_crash, "the autopilot reported no crash, and none shows", how)
     failsafe = event_clause(mission, "failsafe")
     yield OutcomeCheck("no_failsafe", 0.0 if failsafe else silent, "no failsafe acted", failsafe)
-    if flies(kind):
+    if leaves:
         landed = Unavailable("it crashed") if crashed else _landed(mission)
         yield OutcomeCheck("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
     elif done == 1.0 and not mission.ended:
