@@ -1,6 +1,6 @@
 """Are the probabilities estimates, and how many missions does it take until a robot is repaired?
 
-    python -m benchmarks.odds FAULTS... [--most N] [--profile NAME]
+    python -m benchmarks.odds FAULTS... [--most N] [--profile NAME] [--tables DIR]
 
 Each folder holds failed missions with `truth.jsonl`: which resets were really flown or driven under the conditions of
 the failure (`tried`), and which repaired it (`fixing`); or it is what `benchmarks.flown --resets` left. Nothing of them
@@ -15,6 +15,8 @@ was used for training. Told are
 
     care        what is advised first, then the ranking; a part that is named is mended
     ranking     the ranking alone, from its first line
+    classifier  the option that a plain classifier of the table that the profile learned from chooses first; it reads
+                options and contexts (with `--tables`, where the folder holds the profile's)
     deviation   the option that is farthest off its reference first
     everything  all options back at once, then hardware
 """
@@ -25,6 +27,7 @@ import argparse
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +35,14 @@ import numpy as np
 
 import care_core
 from benchmarks.flown import Done
+from benchmarks.peers import PlainClassifier, classifier_of
 from care_core.application.case import Case, Request
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
 from care_core.errors import CareError
 from care_core.learn.skill import calibration_error, reliability
+from care_core.learn.table import read_table
 from care_core.logs.finding import logs_below
 from care_core.records import Record, Struct, field
 
@@ -108,7 +113,7 @@ def failures(folder: Path, most: int, profile: str | None) -> Iterator[Failure]:
 
 def _recorded(folder: Path) -> Iterator[tuple[Truth, Path | None]]:
     for row in map(json.loads, (folder / "truth.jsonl").read_text(encoding="utf-8").splitlines()):
-        names = (folder / sub / f"{row['tag']}{end}" for sub in (".", "logs") for end in (".BIN", ".bag"))
+        names = (folder / sub / f"{row['tag']}{end}" for sub in (".", "logs") for end in (".BIN", ".bag", ".ulg"))
         if not row["ok"]:
             yield row, next((path for path in names if path.exists()), None)
 
@@ -125,17 +130,31 @@ def _flown(folder: Path) -> Iterator[tuple[Truth, Path | None]]:
         yield {"fixing": fixing, "tried": tried}, logs_below(folder / f"{fault['number']:04d}" / "fault" / "0")[0]
 
 
-def judge(folder: Path, most: int, profile: str | None) -> Told:
+def judge(folder: Path, most: int, profile: str | None, tables: Path | None = None) -> Told:
     told = Told()
+    peers: dict[str, PlainClassifier | None] = {}
     for one in failures(folder, most, profile):
         told.failures += 1
         diagnosis = one.case.diagnosis
         told.flagged += bool(diagnosis.faults) or any(f.severity == "critical" for f in diagnosis.health.findings)
         _count_hypotheses(told, one)
         _count_promises(told, one)
-        for way, proposals in WAYS.items():
+        ways = dict(WAYS)
+        if tables is not None and (peer := _peer_of(one, tables, peers)) is not None:
+            ways["classifier"] = partial(_by_classifier, peer)
+        for way, proposals in ways.items():
             told.missions.setdefault(way, []).append(missions_until_repaired(one, proposals(one)))
     return told
+
+
+def _peer_of(one: Failure, tables: Path, known: dict[str, PlainClassifier | None]) -> PlainClassifier | None:
+    """A classifier of the table that the profile of a failure learned from, None where the folder does not hold it."""
+    assert one.case.reading is not None
+    schema = one.case.reading.profile.schema
+    if schema.name not in known:
+        table = next((path for path in sorted(tables.glob(f"{schema.name}.*"))), None)
+        known[schema.name] = None if table is None else classifier_of(read_table(table, schema), schema)
+    return known[schema.name]
 
 
 def _count_hypotheses(told: Told, one: Failure) -> None:
@@ -200,6 +219,14 @@ def _by_deviation(one: Failure) -> list[frozenset[str]]:
     return [frozenset((name,)) for name in sorted(off, key=lambda name: -far[name])]
 
 
+def _by_classifier(peer: PlainClassifier, one: Failure) -> list[frozenset[str]]:
+    query = one.query
+    return [
+        frozenset((name,))
+        for name in peer.rank(query.config, query.reference, deviating(query.config, query.reference))
+    ]
+
+
 def _everything(one: Failure) -> list[frozenset[str]]:
     return [frozenset(deviating(one.query.config, one.query.reference)), frozenset((HARDWARE,))]
 
@@ -239,10 +266,11 @@ def main() -> None:
     parser.add_argument("folders", nargs="+", type=Path, help="folders with truth.jsonl and logs")
     parser.add_argument("--most", type=int, default=10**9, help="so many failures of each")
     parser.add_argument("--profile", help="a folder or a name, in place of the one that fits best")
+    parser.add_argument("--tables", type=Path, help="folder of NAME.parquet or NAME.csv that the profiles learned from")
     asked = parser.parse_args()
     os.environ["CARE_HISTORY"] = "off"  # simulated vehicles share a name, and a run of one is no good run of another
     for folder in asked.folders:
-        show(folder, judge(folder, asked.most, asked.profile))
+        show(folder, judge(folder, asked.most, asked.profile, asked.tables))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import pandas as pd
 from sklearn.ensemble import ExtraTreesClassifier, GradientBoostingClassifier
 
 from care_core.causal.mechanisms import columns
+from care_core.learn.skill import all_met
 from care_core.numbers import Bools, Floats
 from care_core.profile.schema import Schema
 
@@ -45,3 +46,10 @@ class PlainClassifier:
         """Options by the probability of meeting everything when each alone goes back to its reference."""
         reached = self.probability([{**config, name: reference[name]} for name in suspects])
         return [suspects[i] for i in np.argsort(-reached, kind="stable")]
+
+
+def classifier_of(frame: pd.DataFrame, schema: Schema) -> PlainClassifier:
+    """The classifier of a training table that reads options and contexts."""
+    filled = frame.fillna({v.name: frame[v.name].median() for v in schema.contexts})
+    inputs = [v.name for v in (*schema.options, *schema.contexts)]
+    return PlainClassifier(filled, all_met(frame, schema) == 1.0, inputs)

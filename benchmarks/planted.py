@@ -1,6 +1,6 @@
 """Does the diagnosis keep its promises where the truth is planted? One table, fixed for good.
 
-    python -m benchmarks.planted [--robots 2] [--runs 400] [--faults 20]
+    python -m benchmarks.planted [--robots 2] [--seed 0] [--runs 400] [--faults 20]
 
 A small simulated robot in eight worlds, each with one thing that breaks naive diagnosis. A profile is trained on each
 (resamples included, so that confidence means what it means in the field), failed runs are diagnosed by the engine, and
@@ -311,11 +311,12 @@ def brier(promised: Floats, kept: Floats) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robots", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0, help="of the first robot; the others follow")
     parser.add_argument("--runs", type=int, default=400)
     parser.add_argument("--faults", type=int, default=20, help="failed runs asked of each robot")
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
-    tasks = [(world, seed) for world in WORLDS for seed in range(args.robots)]
+    tasks = [(world, seed) for world in WORLDS for seed in range(args.seed, args.seed + args.robots)]
     answers = Parallel(n_jobs=args.jobs)(delayed(measure)(w, seed, args.runs, args.faults) for w, seed in tasks)
     scores: dict[str, Score] = {}
     for (world, _), answer in zip(tasks, answers, strict=True):

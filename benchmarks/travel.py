@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
-from benchmarks.peers import PlainClassifier
+from benchmarks.peers import PlainClassifier, classifier_of
 from care_core.causal.all_objectives import AllObjectives
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Training
@@ -149,8 +149,7 @@ def _predict(frame: pd.DataFrame, schema: Schema, test: Bools) -> LeftOut:
             summaries={}, skill={}, training=training, mechanisms=mechanisms,
         )  # fmt: skip
         medians = {v.name: train[v.name].median() for v in schema.contexts}
-        inputs = [v.name for v in (*schema.options, *schema.contexts)]
-        peer = PlainClassifier(train.fillna(medians), all_met(train, schema) == 1.0, inputs)
+        peer = classifier_of(train, schema)
         flown = {name: needs(schema.variables[name], frame, schema)[test] for name in measured(schema)}
         return _asked(
             model, schema, rows, rows.fillna(medians), flown, peer, _distance(train, rows, APART[schema.name])
@@ -363,9 +362,7 @@ def main() -> None:
     if args.shared is None or args.table is None:
         parser.error("give --shared and --table, or --unseen")
     frame = read_table(args.table, schema)[list(schema.variables)]
-    inputs = [v.name for v in (*schema.options, *schema.contexts)]
-    filled = frame.fillna({v.name: frame[v.name].median() for v in schema.contexts})
-    peer = PlainClassifier(filled, all_met(frame, schema) == 1.0, inputs)
+    peer = classifier_of(frame, schema)
     show_faults(judge_faults(profile, args.shared / "data" / FAULTS[args.platform] / "faults", peer))
     if args.folds:
         show_left_out(left_out(frame, schema, args.folds), frame, schema)

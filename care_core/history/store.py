@@ -27,7 +27,7 @@ from care_core.text import clean
 SWITCH = "CARE_HISTORY"
 """Environment variable: `off`, or the file to use instead."""
 
-_VERSION = 2
+_VERSION = 3
 _OWN_FILE, _OWN_FOLDER = 0o600, 0o700
 _WAIT_S = 30.0
 """How long a process waits for others that are writing: each takes milliseconds, a slow card may stop for seconds."""
@@ -55,6 +55,11 @@ create table watched (
 create index watched_stamp on watched (stamp);
 """
 """What version 2 added: whose runs they are, what was asked, all parameters; and what `care watch` has done."""
+_SINCE_3 = """
+create index triages_robot on triages (robot);
+"""
+"""What version 3 added: the earlier runs of one robot are found without a walk through every document in the file."""
+_STEPS = (_TABLES, _SINCE_2, _SINCE_3)
 
 
 JUDGED_BY = "log_sha256 = ? and (instr(about, ?) > 0 or (? = '' and instr(about, '\"terms\": ') = 0))"
@@ -366,7 +371,7 @@ def _restrict(path: Path, mode: int) -> None:
 
 
 def _bring_up_to_date(connection: sqlite3.Connection, version: int) -> None:
-    for needed in (_TABLES, _SINCE_2)[version:]:
+    for needed in _STEPS[version:]:
         for statement in filter(str.strip, needed.split(";")):
             connection.execute(statement)
     connection.execute(f"pragma user_version = {_VERSION}")
@@ -384,7 +389,7 @@ def _schema_of(connection: sqlite3.Connection) -> list[tuple[str, str, str]]:
 def _schema(version: int) -> frozenset[tuple[str, str, str]]:
     """What `_schema_of` finds in a store of a version that this program made."""
     with closing(sqlite3.connect(":memory:")) as connection:
-        for needed in (_TABLES, _SINCE_2)[:version]:
+        for needed in _STEPS[:version]:
             connection.executescript(needed)
         return frozenset(_schema_of(connection))
 

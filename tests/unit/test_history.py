@@ -77,6 +77,14 @@ def _add(path: Path, start: int) -> None:
         History(path).add_triage(triage_of(number), 1)
 
 
+def test_the_runs_of_a_robot_are_found_by_an_index(history: History) -> None:
+    """Without one every document in the file is read for the few runs of this robot."""
+    history.add_triage(DOCUMENT, 1)
+    with sqlite3.connect(history.path) as connection:
+        ((*_, how),) = connection.execute("explain query plan select id from triages where robot = 'a' order by id desc")
+    assert "INDEX triages_robot" in how
+
+
 def test_processes_that_write_at_once_lose_nothing(history: History) -> None:
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         list(pool.map(_add, [history.path] * 4, (0, 100, 200, 300)))
