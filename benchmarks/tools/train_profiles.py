@@ -91,8 +91,8 @@ SOURCES = {
     "px4": Source(
         (),
         "Missions of the PX4 v1.15.4 firmware in its simulation in hardware (SIH), recorded by this project under "
-        "random configurations, winds and gusts: 954 flights of 90 settings (mission, vehicle, site), of each the "
-        "reference twice and flights with one to four options off, in 540 of them as failed and with options put back; "
+        "random configurations, winds and gusts: 1269 flights of 113 settings (mission, vehicle, site), of each the "
+        "reference twice and flights with one to four options off, in 855 of them as failed and with options put back; "
         "ULog files, read by `care ingest`.",
         table="px4.csv",
     ),

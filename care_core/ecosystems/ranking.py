@@ -57,7 +57,8 @@ def rank_findings(
             one for one in left if _belongs(root, one, reach) and not any(_belongs(it, one, reach) for it in surer)
         ]
         led_to = _led_to(root, below, explains)
-        others = [one for one in below if one not in led_to and one.onset_s <= root.end_s + UNLINKED_S]
+        unlinked = [one for one in below if one not in led_to and one.onset_s <= root.end_s + UNLINKED_S]
+        others = [one for one in unlinked if not _failed_by_itself(root, one)]
         left = [one for one in left if one not in led_to and one not in others]
         told.append(replace(root, consequences=_in_time(led_to), followed_by=_in_time(others)))
     return tuple(sorted(told, key=lambda one: (*_rank(one), not _brought_down(one))))
@@ -159,6 +160,11 @@ def _led_to(root: Finding, others: Iterable[Finding], explains: Explains) -> lis
         found += after
         steps += after
     return found
+
+
+def _failed_by_itself(root: Finding, finding: Finding) -> bool:
+    """Whether a part surely failed while the vehicle was set wrong, by no step from one to the other."""
+    return root.suspect == "parameter" and finding.suspect == "hardware" and finding.probability >= LIKELY
 
 
 def _only_set(cause: Finding, finding: Finding) -> bool:

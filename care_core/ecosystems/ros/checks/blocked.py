@@ -27,7 +27,8 @@ WIDE_M = LIMITS.add("how wide it is at least", 0.4, "m", "a leg or a box; less i
 RAYS = LIMITS.add("rays that see it", 8, "", "fewer are stray returns")
 FEWEST_RAYS = LIMITS.add("rays of a scan", 30, "", "fewer do not show a thing's width")
 BESIDE = int(LIMITS.add("rays beside each that must have seen further", 2, "", "edges of what stood there before"))
-TURN_RAD = LIMITS.add("turn between the scans", 0.1, "rad", "where the laser sits on the robot is not known")
+TURN_RAD = LIMITS.add("turn between the scans", 0.6, "rad", "what was ahead is still in sight of most scanners")
+LEVER_M = LIMITS.add("how far off the middle of the turn the laser sits", 0.4, "m", "where is not known: half a robot")
 STUCK_S = LIMITS.add("time without getting further", 10.0, "s", "as Nav2's progress checker: movement_time_allowance")
 STUCK_M = LIMITS.add("way in that time", 0.5, "m", "as Nav2's progress checker: required_movement_radius")
 SOON_S = LIMITS.add("how soon the robot is stuck", 60.0, "s", "later something else has stopped it")
@@ -49,7 +50,7 @@ def find(drive: Drive) -> Iterator[Finding]:
             stuck_s = _stuck(odometry, at)
             if stuck_s is None or not any(goal.failed and goal.end_s >= at for goal in drive.goals):
                 continue
-            far, wide = float(median(points[:, 0])), float(np.ptp(points[:, 1]))
+            far, wide = float(median(points[:, 0])), _width(points)
             yield Finding(
                 kind="blocked",
                 title="something appeared in the robot's way",
@@ -76,14 +77,15 @@ def _appeared(scans: Scans, poses: Floats) -> Iterator[tuple[int, Floats]]:
         if len(points) < RAYS:
             continue
         later = _new_points(scans, poses, min(row + 1, len(scans.t) - 1), earlier)
-        if len(later) >= RAYS and np.ptp(later[:, 1]) >= WIDE_M:
+        if len(later) >= RAYS and max(_width(points), _width(later)) >= WIDE_M:
             yield row, points
 
 
 def _new_points(scans: Scans, poses: Floats, row: int, earlier: int) -> Floats:
     """Points of a scan ahead of the robot that lie in what an earlier scan saw as free; shape (n, 2), m."""
     (x, y, yaw), (x0, y0, yaw0) = poses[row], poses[earlier]
-    if abs(yaw - yaw0) > TURN_RAD:
+    turn = abs(yaw - yaw0)
+    if turn > TURN_RAD:
         return np.empty((0, 2))
     ranges = scans.ranges[row].astype(np.float64)
     ahead, aside = ranges * np.cos(scans.angles), ranges * np.sin(scans.angles)
@@ -91,15 +93,23 @@ def _new_points(scans: Scans, poses: Floats, row: int, earlier: int) -> Floats:
     ahead, aside = ahead[near], aside[near]
     world_x = x + ahead * np.cos(yaw) - aside * np.sin(yaw) - x0
     world_y = y + ahead * np.sin(yaw) + aside * np.cos(yaw) - y0
-    angle = (np.arctan2(world_y, world_x) - yaw0 + np.pi) % (2 * np.pi) - np.pi
-    ray = np.round((angle - scans.angles[0]) / (scans.angles[1] - scans.angles[0])).astype(int)
-    inside = (ray >= BESIDE) & (ray < len(scans.angles) - BESIDE)
-    middle = np.clip(ray, BESIDE, len(scans.angles) - BESIDE - 1)
-    around = scans.ranges[earlier][middle[:, None] + np.arange(-BESIDE, BESIDE + 1)]
+    angle, step = (np.arctan2(world_y, world_x) - yaw0 + np.pi) % (2 * np.pi) - np.pi, scans.angles[1] - scans.angles[0]
+    ray = np.round((angle - scans.angles[0]) / step).astype(int)
+    far = np.hypot(world_x, world_y)
+    beside = BESIDE + np.ceil(LEVER_M * turn / np.maximum(far, LEVER_M) / abs(step)).astype(int)
+    inside = (ray >= beside) & (ray < len(scans.angles) - beside)
+    free = np.array([
+        is_inside and bool(np.min(scans.ranges[earlier][at - wide : at + wide + 1]) > away)
+        for at, wide, away, is_inside in zip(ray, beside, far + FREE_M, inside, strict=True)
+    ], dtype=bool)  # fmt: skip
     # A ray that came back from nowhere says nothing: np.min keeps its nan, and the comparison fails.
-    free = np.min(around, axis=1) > np.hypot(world_x, world_y) + FREE_M
-    points: Floats = np.stack([ahead, aside], axis=1)[inside & free]
+    points: Floats = np.stack([ahead, aside], axis=1)[free]
     return points
+
+
+def _width(points: Floats) -> float:
+    """How far what was seen reaches, whichever way the robot looked; m."""
+    return float(np.hypot(*np.ptp(points, axis=0)))
 
 
 def _poses(odometry: Odometry, t: Floats) -> Floats:

@@ -44,6 +44,9 @@ PULL_SAMPLES = int(LIMITS.add("samples that pull", 25, "", f"with 20 one of {_HE
 PULL_OF_EACH = LIMITS.add("samples of commands to one side", 4, "", "fewer tell nothing of that side")
 PULL_ALIKE = LIMITS.add("share of the pull on commands to the other sides", 0.33, "", "a pull knows of no command")
 TURNS_RADPS = LIMITS.add("turn of a command that asks for one", 0.15, "rad/s", "less is steering straight on")
+HARD_RADPM = LIMITS.add("turn beyond the commands of a hard pull", 0.35, "rad/m", f"none of {_HEALTHY} pulls so")
+HARD_SAMPLES = int(LIMITS.add("samples that pull hard", 12, "", "such a robot soon gets no further"))
+HARD_AGREE = LIMITS.add("share of them that agree", 0.95, "", f"none of {_HEALTHY} pulls so")
 PULL_AGREE = LIMITS.add("share of them that agree", 0.8, "", f"none of {_HEALTHY} pulls so")
 PULL_BEFORE = int(LIMITS.add("samples before that do not pull", 10, "", "a robot that always pulled is built so"))
 SLOWER = LIMITS.add("share of the commanded speed while it pulls", 0.97, "", "a slow side makes the robot slower, too")
@@ -401,30 +404,29 @@ def _pulling(drive: Drive, motion: Following) -> Iterator[Finding]:
     steady &= motion.speed_high - motion.speed_low < STEADY_MPS
     steady &= motion.turn_high - motion.turn_low < STEADY_RADPS
     rows = _spaced(odometry.t, np.flatnonzero(steady))
-    if len(rows) < PULL_BEFORE + PULL_SAMPLES:
-        return
     t, speed = odometry.t[rows], odometry.speed[rows]
     ordered: Floats = (motion.turn_high + motion.turn_low)[rows] / 2
     pull: Floats = (odometry.turn[rows] - ordered) / speed
-    windows = sliding_window_view(pull, PULL_SAMPLES)[PULL_BEFORE:]
-    shares = sliding_window_view(speed / motion.wanted_speed[rows], PULL_SAMPLES)[PULL_BEFORE:]
-    middles = median(windows, axis=1)
-    agrees = np.mean(np.sign(windows) == np.sign(middles)[:, None], axis=1)
-    fits = (np.abs(middles) >= PULL_RADPM) & (agrees >= PULL_AGREE) & (median(shares, axis=1) < SLOWER)
-    for number in np.flatnonzero(fits).tolist():
-        first, middle = number + PULL_BEFORE, float(middles[number])
-        window = slice(first, first + PULL_SAMPLES)
-        if _falls_short(pull[window] * np.sign(middle), ordered[window] * np.sign(middle)):
+    share: Floats = speed / motion.wanted_speed[rows]
+    for samples, least, agreeing in ((PULL_SAMPLES, PULL_RADPM, PULL_AGREE), (HARD_SAMPLES, HARD_RADPM, HARD_AGREE)):
+        if len(rows) < PULL_BEFORE + samples:
             continue
-        if float(median(pull[:first])) * np.sign(middle) < PULL_RADPM / 2:
+        windows = sliding_window_view(pull, samples)[PULL_BEFORE:]
+        middles = median(windows, axis=1)
+        agrees = np.mean(np.sign(windows) == np.sign(middles)[:, None], axis=1)
+        slower = median(sliding_window_view(share, samples)[PULL_BEFORE:], axis=1) < SLOWER
+        for number in np.flatnonzero((np.abs(middles) >= least) & (agrees >= agreeing) & slower).tolist():
+            first, middle = number + PULL_BEFORE, float(middles[number])
+            window, side = slice(first, first + samples), np.sign(middle)
+            always = float(median(pull[:first])) * side >= PULL_RADPM / 2
+            if always or _falls_short(pull[window] * side, ordered[window] * side):
+                continue
             # It began where the sum of what is beyond half of it turns upwards.
-            above = np.cumsum(pull[: first + PULL_SAMPLES] * np.sign(middle) - abs(middle) / 2)
+            above = np.cumsum(pull[: first + samples] * side - abs(middle) / 2)
             span = float(t[int(np.argmin(above))]), float(t[-1])
-            evidence = (
-                f"turns {abs(middle):.2f} rad per metre beyond its commands, {agrees[number]:.0%} of samples agree"
-            )
-            side = "left" if middle > 0 else "right"
-            yield _finding(drive, f"the drive pulls to the {side}", span, evidence, probability=0.8)
+            beyond = f"turns {abs(middle):.2f} rad per metre beyond its commands, {agrees[number]:.0%} of samples agree"
+            to = "left" if middle > 0 else "right"
+            yield _finding(drive, f"the drive pulls to the {to}", span, beyond, probability=0.8)
             return
 
 
