@@ -78,6 +78,8 @@ class Drive(Struct, eq=False):
             "stall": (0.0, 0.0),
             "loss": (0.0, 0.0) if t % 2 < 1.4 else (speed, turn),
             "blocked": (0.0, 0.0),
+            "blocked, turning": (0.0, 0.3),
+            "pulls hard, stands": (0.8 * speed, turn + 0.6 * speed) if t < FAILS_AT_S + 3.2 else (0.0, 0.0),
         }
         return ways.get(self.fault, (speed, turn))
 
@@ -99,7 +101,7 @@ class Drive(Struct, eq=False):
     def _ranges(self, failing: bool) -> Floats:
         """Distances to the walls of a corridor, and to what appeared in it."""
         angles = self.yaw + np.linspace(-np.pi / 2, np.pi / 2, RAYS)
-        ends = [LONG_M] + ([self.x + 1.0] if failing and self.fault == "blocked" else [])
+        ends = [LONG_M] + ([self.x + 1.0] if failing and self.fault.startswith("blocked") else [])
         aside = np.where(np.sin(angles) > 0, WIDE_M - self.y, -WIDE_M - self.y)
         with np.errstate(divide="ignore"):
             ahead = [np.where(np.cos(angles) > 1e-6, (end - self.x) / np.cos(angles), np.inf) for end in ends]

@@ -82,17 +82,17 @@ def _in_time(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _place(finding: Finding, every: Iterable[Finding], reach: Explains) -> tuple[bool, int, bool, bool, float, bool]:
-    """Sorts findings: one whose cause was seen within the slack after it comes after that cause."""
-    causes = (
+    """Sorts findings: one whose cause was seen with it, or within the slack after it, comes after that cause."""
+    causes = [
         other.onset_s
         for other in every
-        if other.onset_s > finding.onset_s
+        if other.onset_s >= finding.onset_s
+        and other is not finding
         and _rank(other) == _rank(finding)
         and _belongs(other, finding, reach)
         and not _belongs(finding, other, reach)
-    )
-    onset_s = max(causes, default=finding.onset_s)
-    return *_rank(finding), onset_s, onset_s > finding.onset_s
+    ]
+    return *_rank(finding), max(causes, default=finding.onset_s), bool(causes)
 
 
 def _rank(finding: Finding) -> tuple[bool, int, bool, bool]:

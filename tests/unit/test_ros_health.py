@@ -57,10 +57,12 @@ def looked_at(drive: Drive, tmp_path: Path) -> Health:
         ("drift", "localisation", "hardware"),
         ("weak", "drive", "hardware"),
         ("pulls", "drive", "hardware"),
+        ("pulls hard, stands", "drive", "hardware"),
         ("stall", "drive", "hardware"),
         ("loss", "commands", "hardware"),
         ("battery", "battery", "hardware"),
         ("blocked", "blocked", "world"),
+        ("blocked, turning", "blocked", "world"),
     ],
 )
 def test_a_fault_is_the_first_finding_with_its_onset(fault: str, kind: str, suspect: str, tmp_path: Path) -> None:
