@@ -50,7 +50,7 @@ def find(drive: Drive) -> Iterator[Finding]:
             stuck_s = _stuck(odometry, at)
             if stuck_s is None or not any(goal.failed and goal.end_s >= at for goal in drive.goals):
                 continue
-            far, wide = float(median(points[:, 0])), _width(points)
+            far, wide = float(median(points[:, 0])), _width(scans, points)
             yield Finding(
                 kind="blocked",
                 title="something appeared in the robot's way",
@@ -77,7 +77,7 @@ def _appeared(scans: Scans, poses: Floats) -> Iterator[tuple[int, Floats]]:
         if len(points) < RAYS:
             continue
         later = _new_points(scans, poses, min(row + 1, len(scans.t) - 1), earlier)
-        if len(later) >= RAYS and max(_width(points), _width(later)) >= WIDE_M:
+        if len(later) >= RAYS and max(_width(scans, points), _width(scans, later)) >= WIDE_M:
             yield row, points
 
 
@@ -107,9 +107,10 @@ def _new_points(scans: Scans, poses: Floats, row: int, earlier: int) -> Floats:
     return points
 
 
-def _width(points: Floats) -> float:
-    """How far what was seen reaches, whichever way the robot looked; m."""
-    return float(np.hypot(*np.ptp(points, axis=0)))
+def _width(scans: Scans, points: Floats) -> float:
+    """How wide what was seen is, across the sight: as many rays as it stopped, where it is; m."""
+    step = abs(float(scans.angles[1] - scans.angles[0]))
+    return len(points) * step * float(median(np.hypot(points[:, 0], points[:, 1])))
 
 
 def _poses(odometry: Odometry, t: Floats) -> Floats:
