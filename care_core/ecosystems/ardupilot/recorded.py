@@ -21,6 +21,7 @@ from care_core.ecosystems.ardupilot.texts import Refusal, code_of, in_full, refu
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.plausible import sound as without_nonsense
 from care_core.ecosystems.vehicles import Kind, Vehicle, Way, is_simulated, mode_name, mode_number, vehicle_of, way_of
+from care_core.ecosystems.vehicles.errors import LEAK
 from care_core.ecosystems.vehicles.modes import px4_mode
 from care_core.logs import formats
 from care_core.logs.base import Log, Table, Wanted
@@ -209,13 +210,17 @@ class Recorded(RunModel):
 
     @cached_property
     def error_records(self) -> tuple[ErrorRecord, ...]:
-        """The ERR records."""
+        """The ERR records, but for a leak that no detector can have told of: the firmware says so as it starts."""
         table = self.one("ERR", "Subsys", "ECode")
         if table is None:
             return ()
         known = table.where(np.isfinite(table["Subsys"]) & np.isfinite(table["ECode"]))
         columns = (known["Subsys"].astype(int).tolist(), known["ECode"].astype(int).tolist())
-        return tuple(map(ErrorRecord, known.t.tolist(), *columns))
+        records = map(ErrorRecord, known.t.tolist(), *columns)
+        pins = [self.setting(f"LEAK{number}_PIN") for number in (1, 2, 3)]
+        known_pins = [pin for pin in pins if pin is not None]
+        has_detector = not known_pins or max(known_pins) >= 0
+        return tuple(one for one in records if has_detector or one.subsystem != LEAK)
 
     def errors(self, subsystem: int) -> list[tuple[float, int]]:
         """Times and codes of the ERR records of a subsystem, in telemetry of the texts that say the same."""

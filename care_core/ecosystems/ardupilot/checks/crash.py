@@ -11,14 +11,19 @@ from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import CAME_DOWN, LEANED, STEERED, STRUCK, UNDRIVEN, Finding
+from care_core.ecosystems.spans import runs
 from care_core.ecosystems.vehicles.errors import CRASH_CHECK
 from care_core.logs.base import Wanted
+from care_core.numbers import Floats
 
 READS: Wanted = {"RCIN": ("C3",)}
 
 _FEWEST = 5
 LIMITS = Limits()
 _LOW_M = LIMITS.add("height of a tip-over", 1.5, "m", "a choice: lower than a person's chest")
+_LOW_BY_BARO_M = LIMITS.add("the same by the barometer", 3.0, "m", "propellers blow at it: 1 to 2 m off")
+_UPRIGHT_DEG = LIMITS.add("tilt of what stands", 45.0, "deg", "a choice: steeper than any slope to start on")
+_STANDS_S = LIMITS.add("time that it stands", 1.0, "s", "a choice: what falls is down sooner")
 _TAKEOFF_S = LIMITS.add("tip-over after the first throttle", 15.0, "s", "a choice: a take-off takes no longer")
 _FIRST_THROTTLE = LIMITS.add("first throttle", 0.15, "", "a choice: MOT_SPIN_MIN as shipped")
 _IDLES = LIMITS.add("throttle that is cut", 0.05, "", "a choice: motors idle below it")
@@ -195,11 +200,8 @@ def _tipped(flight: Flight, at: float) -> bool:
         return False
     known, driven = flight.height, flight.throttle
     span = max(span[0], _last_stood(flight, at) or span[0]), span[1]
-    if known is not None:
-        t, height = known
-        before = height[(t >= span[0]) & (t <= at)]
-        if len(before) and float(np.max(before)) > _LOW_M:
-            return False
+    if _highest(known, span[0], at) > _LOW_M or _highest(flight.barometer, span[0], at) > _LOW_BY_BARO_M:
+        return False
     if driven is None:
         return known is not None
     t, throttle = driven
@@ -207,9 +209,17 @@ def _tipped(flight: Flight, at: float) -> bool:
     return bool(len(up)) and at - float(up[0]) < _TAKEOFF_S
 
 
+def _highest(known: tuple[Floats, Floats] | None, since_s: float, at: float) -> float:
+    """How high it was in that time, m; 0 where nothing tells."""
+    if known is None:
+        return 0.0
+    t, height = known
+    return float(np.max(height[(t >= since_s) & (t <= at)], initial=0.0))
+
+
 def _last_stood(flight: Flight, at: float) -> float | None:
-    """Until when it stood with its throttle cut before that was last up; None where it did not, or the log does not
-    tell."""
+    """Until when it stood upright with its throttle cut before that was last up; None where it did not, or the log does
+    not tell. What falls stands nowhere."""
     if flight.height is None or flight.throttle is None:
         return None
     t, throttle = flight.throttle
@@ -217,7 +227,11 @@ def _last_stood(flight: Flight, at: float) -> float | None:
     if not len(up):
         return None
     stood = (t < up[-1]) & (throttle < _FIRST_THROTTLE) & (np.interp(t, *flight.height) < OFF_GROUND_M)
-    return float(t[stood][-1]) if stood.any() else None
+    if flight.barometer is not None:
+        stood &= np.interp(t, *flight.barometer) < _LOW_BY_BARO_M
+    if flight.tilt is not None:
+        stood &= np.interp(t, *flight.tilt) < _UPRIGHT_DEG
+    return max((end for start, end in runs(t, stood) if end - start >= _STANDS_S), default=None)
 
 
 def _undriven(flight: Flight, at: float) -> bool:
