@@ -65,6 +65,11 @@ class Made:
     def after(self, start_s: float, end_s: float = END_S) -> Bools:
         return (self.t >= start_s) & (self.t <= end_s)
 
+    def lies(self, rows: Bools, lean_deg: float) -> None:
+        """Gravity as what lies so far on its right side feels it."""
+        lean = np.radians(lean_deg)
+        self.table["IMU"]["AccY"][rows], self.table["IMU"]["AccZ"][rows] = 9.8 * np.sin(lean), -9.8 * np.cos(lean)
+
     def find(self) -> tuple[Finding, ...]:
         return find(self.flight())
 

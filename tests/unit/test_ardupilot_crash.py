@@ -193,7 +193,47 @@ def test_a_copter_that_lies_tilted_when_it_has_landed_turned_over(throttle: floa
     lies = made.after(DOWN_S)
     made.table["CTUN"]["ThO"][lies] = made.table["CTUN"]["ThI"][lies] = throttle
     made.table["ATT"]["Pitch"][lies], made.table["ATT"]["DesPitch"][lies] = -46.0, -46.0
+    made.lies(lies, 46.0 if throttle == 0.0 else 0.0)  # in the air thrust alone is felt
     assert (made.flight().lost_control_s is not None) == is_told
+
+
+def test_what_gravity_holds_on_its_legs_does_not_lie_whatever_its_attitude_says() -> None:
+    """A gyro that turns by itself carries the attitude away, with motors that idle and shake it."""
+    made = Made()
+    made.table["CTUN"]["ThO"][:] = np.where(made.after(UP_S), 0.3, 0.0)
+    for table, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt")):
+        if field in made.table[table]:
+            made.table[table][field] = made.noise(0.05)
+    made.table["ATT"]["Roll"] = np.clip(15.0 * (made.t - UP_S), 0.0, 140.0)
+    made.table["IMU"]["AccX"] += made.noise(2.0)
+    assert made.flight().lost_control_s is None
+    made.lies(made.after(UP_S), 90.0)
+    assert made.flight().lost_control_s is not None
+
+
+@pytest.mark.parametrize(("felt", "by_barometer"), [(8.7, True), (9.7, False)])
+def test_accelerometers_that_feel_no_gravity_carry_the_height_off(felt: float, by_barometer: bool) -> None:
+    made = Made()
+    made.table["IMU"]["AccZ"] = -felt + made.noise(0.05)
+    for table, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[table][field] -= np.where(made.after(UP_S), 8.0, 0.0)
+    flight = made.flight()
+    assert flight.height is not None and flight.barometer is not None and flight.estimated_height is not None
+    told = flight.barometer if by_barometer else flight.estimated_height
+    assert np.allclose(flight.height[1], told[1])
+
+
+def test_a_copter_that_flew_before_it_fell_did_not_tip_over_at_take_off() -> None:
+    """Its throttle was down as it fell past the ground by its estimate: it stood nowhere."""
+    made = Made()
+    fell = made.after(DOWN_S - 6.0)
+    made.table["CTUN"]["ThO"][made.after(DOWN_S - 6.0, DOWN_S - 5.0)] = 0.0
+    for table, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[table][field][fell] = 0.2
+    made.table["CTUN"]["ThO"][made.after(DOWN_S - 5.0)] = 0.4
+    made.table["ATT"]["Roll"][made.after(DOWN_S - 4.5)] = 120.0
+    made.lies(made.after(DOWN_S - 4.5), 120.0)
+    assert "it tipped over at take-off" not in [one.title for one in every_finding(made.find())]
 
 
 def test_what_leans_as_it_is_told_flies_whatever_its_height_is_said_to_be() -> None:
@@ -277,6 +317,7 @@ def test_what_tips_as_it_touches_down_with_its_throttle_cut_hit_nothing() -> Non
     made.table["CTUN"]["ThO"][made.t > DOWN_S - 0.1] = 0.0
     made.table["CTUN"]["ThO"][made.after(DOWN_S - 3.0, DOWN_S - 0.2)] = HOVER
     made.table["ATT"]["Pitch"][tips] = 70.0
+    made.lies(tips, 70.0)
     made.table["IMU"]["AccZ"][made.after(DOWN_S, DOWN_S + 0.15)] = -45.0
     assert "it turned over at landing" in [one.title for one in every_finding(made.find())]
 
@@ -334,6 +375,7 @@ def test_what_stood_again_and_was_told_to_lean_tipped_over(asked_deg: float, tit
     tips = made.after(DOWN_S + 2.5)
     made.table["ATT"]["DesPitch"][tips] = asked_deg
     made.table["ATT"]["Pitch"][tips] = np.minimum(60.0 * (made.t[tips] - DOWN_S - 2.5), 170.0)
+    made.lies(made.after(DOWN_S + 3.5), 90.0)
     made.table["IMU"]["AccZ"][made.after(DOWN_S + 4.0, DOWN_S + 4.2)] = -45.0
     found = every_finding(made.find())
     assert [one.title for one in found if one.kind in ("crash", "takeoff")] == [title]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -13,9 +15,10 @@ from care_core.run import Setting
 from tests.flights import ARMED_S, DOWN_S, END_S, FAILS_S, HEIGHT_M, Made, first, flight_of
 
 
-def leaks(firmware: str, code: float = 0.0, message: str = "") -> list[float | None]:
-    """When water is told of in a dive whose log says these at 60 s."""
+def leaks(firmware: str, code: float = 0.0, message: str = "", pins: Sequence[float] = ()) -> list[float | None]:
+    """When water is told of in a dive whose log says these at 60 s; the pins are those of its detectors."""
     dive = Made()
+    dive.settings |= {f"LEAK{number}_PIN": pin for number, pin in enumerate(pins, start=1)}
     dive.facts = {"firmware": firmware}
     dive.rows["ERR"] = [(60.0, {"Subsys": 27.0, "ECode": code})]
     dive.rows["MSG"] = [(60.0, {"Message": message})]
@@ -88,6 +91,8 @@ def test_a_submarine_that_leaks() -> None:
     assert leaks("ArduSub V4.5.0", message="Leak detector is set up") == []
     assert leaks("ArduSub V4.5.0") == [], "code 0 says that it is over"
     assert leaks("ArduCopter V4.5.0", code=1.0) == []
+    assert leaks("ArduSub V4.5.0", code=1.0, pins=(-1, 27, -1)) == [60.0]
+    assert leaks("ArduSub V4.5.0", code=1.0, pins=(-1, -1, -1)) == [], "no detector: the firmware says so as it starts"
 
 
 def test_a_failsafe_whose_text_comes_after_its_disarming_was_a_lost_radio() -> None:

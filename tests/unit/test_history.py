@@ -81,7 +81,9 @@ def test_the_runs_of_a_robot_are_found_by_an_index(history: History) -> None:
     """Without one every document in the file is read for the few runs of this robot."""
     history.add_triage(DOCUMENT, 1)
     with sqlite3.connect(history.path) as connection:
-        ((*_, how),) = connection.execute("explain query plan select id from triages where robot = 'a' order by id desc")
+        ((*_, how),) = connection.execute(
+            "explain query plan select id from triages where robot = 'a' order by id desc"
+        )
     assert "INDEX triages_robot" in how
 
 

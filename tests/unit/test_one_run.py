@@ -111,6 +111,7 @@ def test_a_copter_on_its_back_has_crashed_where_its_motors_had_just_worked(throt
     made = Made()
     over = made.t >= DOWN_S + 4.0
     made.table["ATT"]["Roll"][over] = 178.0
+    made.lies(over, 178.0)
     made.table["CTUN"]["ThO"][(made.t > DOWN_S) & (made.t < DOWN_S + 4.5)] = throttle
     made.rows["ARM"] = made.rows["ARM"][:1]
     assert (made.flight().lost_control_s is not None) is lies
@@ -120,6 +121,7 @@ def test_a_copter_on_its_back_has_crashed_where_its_motors_had_just_worked(throt
 def test_a_copter_that_lies_on_its_side_did_not_land(lean_deg: float, lies: bool) -> None:
     made = Made()
     made.table["ATT"]["Roll"][made.t >= DOWN_S + 2.0] = lean_deg
+    made.lies(made.t >= DOWN_S + 2.0, lean_deg)
     assert (made.flight().lost_control_s is not None) is lies
 
 

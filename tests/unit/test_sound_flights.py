@@ -299,6 +299,22 @@ def test_what_keeps_its_height_once_its_motors_stop_stands_on_higher_ground(
     assert {one.name: one.value for one in plain_checks(mission)}["landed"] == landed
 
 
+@pytest.mark.parametrize(("by_barometer_m", "landed"), [(0.2, 1.0), (4.0, 0.0)])
+def test_an_estimate_that_ran_away_lifts_nothing_off_the_ground(by_barometer_m: float, landed: float) -> None:
+    made = Made()
+    off_s = DOWN_S + 5.0
+    at_end = made.after(60.0)
+    falls = np.clip(4.0 - 5.0 * np.clip(made.t - off_s, 0.0, None), 0.0, None) + made.noise(0.05)
+    for name, field in HEIGHTS:
+        made.table[name][field][at_end] = falls[at_end]
+    for name, field in (("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt")):
+        if name in made.table:
+            made.table[name][field][at_end] = by_barometer_m + made.noise(0.05)[at_end]
+    made.table["CTUN"]["ThO"][made.after(60.0, off_s)] = 0.3
+    mission = Mission(made.flight(), made.tables(), 5.0, off_s, True, {})
+    assert {one.name: one.value for one in plain_checks(mission)}["landed"] == landed
+
+
 def test_a_pack_that_is_not_full_darkens_no_board() -> None:
     made = Made()
     made.table["BAT"]["Volt"] -= 1.1

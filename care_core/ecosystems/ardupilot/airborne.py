@@ -88,6 +88,8 @@ _GRAZES, _GRAZED = 100.0, 0.7
 """m/s^2: a belly landing is as hard at most; and the share of its speed that what touches nothing keeps."""
 _FAST_MS, _STILL = 5.0, 2.0
 """A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
+_LEVEL = 0.2
+"""Tangent of a lean (11 degrees) that slopes and legs have."""
 _STILL_S, _FEWEST = 3.0, 5
 """What nothing moves so long after its attitude is said to be lost stands, told by so many messages at least."""
 _SIMULATED_HIT = re.compile(r"(?:SIM )?Hit ground at (\d+(?:\.\d+)?) m/s")
@@ -259,11 +261,13 @@ class Airborne(Armed):
             flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > _HELD
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
-        return min((t for t in (self._overturned_s, self._spun_s) if t is not None), default=None)
+        over = [t for t in (self._overturned_s, self._spun_s) if t is not None and not self.stands_still(t)]
+        return min(over, default=None)
 
     def stands_still(self, at: float) -> bool:
         """Whether accelerometers and barometer feel nothing, near the ground, of what its attitude or its demand tells:
-        it is held, or its gyros turn by themselves."""
+        it is held, or its gyros turn by themselves. With motors that shake it, gravity tells: what lies on its side
+        feels it there."""
         felt, height = self.one("IMU", "AccX", "AccY", "AccZ"), self.barometer
         if felt is None or height is None:
             return False
@@ -271,7 +275,18 @@ class Airborne(Armed):
         if now.sum() < _FEWEST or then.sum() < _FEWEST or float(median(height[1][then])) > _LOW_M:
             return False
         axes = (felt["AccX"], felt["AccY"], felt["AccZ"])
-        return max(float(np.ptp(one[now])) for one in axes) < _STILL and float(np.ptp(height[1][then])) < _REST_M
+        is_quiet = max(float(np.ptp(one[now])) for one in axes) < _STILL
+        return float(np.ptp(height[1][then])) < _REST_M and (is_quiet or self._is_level(axes, felt.t, at))
+
+    def _is_level(self, axes: Sequence[Floats], t: Floats, at: float) -> bool:
+        """Whether gravity lies along its legs from a time on while its attitude says that it leans far."""
+        after = (t > at) & (t < at + _STILL_S)
+        if self.tilt is None or after.sum() < _FEWEST:
+            return False
+        x, y, z = (float(median(axis[after])) for axis in axes)
+        leans = np.interp(np.array([at, at + _STILL_S]), *self.tilt)
+        stands = abs(math.hypot(x, y, z) - GRAVITY) < _STILL / 2 and z < 0 and math.hypot(x, y) < _LEVEL * -z
+        return stands and float(np.min(leans)) > FOLLOWED_DEG and float(np.max(leans)) > _OVER_DEG / 2
 
     @property
     def _lifting_off(self) -> Iterator[Span]:

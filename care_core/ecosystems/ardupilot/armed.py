@@ -14,10 +14,12 @@ from care_core.ecosystems.ardupilot.recorded import Recorded
 from care_core.ecosystems.ardupilot.texts import Refusal
 from care_core.ecosystems.spans import Span, during, runs
 from care_core.ecosystems.vehicles import method_words, unrecorded_changes
+from care_core.geodesy import GRAVITY
 from care_core.logs.base import Table, Wanted
 from care_core.metadata.output_functions import LEFT, MOTORS, RIGHT, THROTTLE
 from care_core.numbers import Bools, Floats, median
 
+_AXES = ("AccX", "AccY", "AccZ")
 READS: Wanted = {
     "ARM": ("ArmState", "Forced", "Method"),
     "STAT": ("Armed", "State"),
@@ -28,6 +30,7 @@ READS: Wanted = {
     "RCOU": tuple(f"C{n}" for n in range(1, 15)),
     "BARO": ("Alt",),
     "GPS": ("Alt", "Status", "Spd"),
+    "IMU": _AXES,
 }
 
 _EV_ARMED, _EV_DISARMED = 10, 11
@@ -42,6 +45,10 @@ _ESTIMATES: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt")}
 _NEAR_HOME_M = 50.0
 _ALIVE_M, _ON_GROUND_M, _APART_M = 0.05, 1.2, 3.0
 """A barometer that moves by more lives, and by less than the second on the ground, propellers and all."""
+_CARRIED_OFF_M, _NO_GRAVITY = 5.0, 0.8
+"""Five times what arming allows; and m/s^2 that an accelerometer which nobody calibrated is off."""
+_REST, _FEWEST_FELT = 0.2, 20
+"""Throttle below which armed motors idle (0.15 in old firmware); records of what is felt until then, at least."""
 _MOVES_MS, _AROUND_S = 3.0, 10.0
 """Faster, it taxies or flies; so long before and after belongs to it."""
 _DRIVES = frozenset((*MOTORS.values(), THROTTLE, LEFT, RIGHT))
@@ -222,8 +229,8 @@ class Armed(Recorded):
     @property
     def height(self) -> tuple[Floats, Floats] | None:
         """Time and height (m) above where it was armed, as estimated by the vehicle; by its barometer where that tells
-        that it never left the ground and the estimate alone runs away."""
-        return self.barometer if self._is_runaway else self.estimated_height
+        that it never left the ground and the estimate alone runs away, or where the accelerometers carried it off."""
+        return self.barometer if self._is_runaway or self._is_carried_off else self.estimated_height
 
     @property
     def estimated_height(self) -> tuple[Floats, Floats] | None:
@@ -281,6 +288,37 @@ class Armed(Recorded):
         received = self.one("GPS", "Alt", "Status")
         fixed = np.empty(0) if received is None else received["Alt"][received["Status"] >= FIX]
         return apart > _APART_M and (len(fixed) == 0 or float(np.ptp(fixed)) < _APART_M)
+
+    @cached_property
+    def _is_carried_off(self) -> bool:
+        """Whether accelerometers that do not feel gravity at rest carried a copter's estimate far off its barometer."""
+        heard, estimate = self.barometer, self.estimated_height
+        if not self.is_copter or heard is None or estimate is None or not self.armed:
+            return False
+        armed = during(self.armed, heard[0])
+        t, baro = heard[0][armed], heard[1][armed]
+        if len(baro) < _FEWEST or np.max(np.abs(np.interp(t, *estimate) - baro)) < _CARRIED_OFF_M:
+            return False
+        felt = self.felt_at_rest
+        return bool(felt) and abs(felt[0] - GRAVITY) > _NO_GRAVITY
+
+    @cached_property
+    def felt_at_rest(self) -> tuple[float, ...]:
+        """What each sensor's accelerometers feel before the throttle is raised, m/s^2, the first one's first; none
+        where too little of that is recorded of it."""
+        driven, first = self.throttle, self.one("IMU", *_AXES)
+        if driven is None or first is None:
+            return ()
+        lifted = driven[0][driven[1] > _REST]
+        until = lifted[0] if len(lifted) else np.inf
+        felt = [_felt(table.where(table.t < until)) for table in (first, *self.all("IMU", *_AXES)[1:])]
+        return () if felt[0] is None else tuple(one for one in felt if one is not None)
+
+
+def _felt(standing: Table) -> float | None:
+    if len(standing) < _FEWEST_FELT:
+        return None
+    return float(median(np.sqrt(sum(standing[axis] ** 2 for axis in _AXES))))
 
 
 def _arm_change(table: Table, row: int) -> ArmChange:

@@ -18,7 +18,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import Span, during, seconds_in
 from care_core.geodesy import GRAVITY
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats, median, quantile
 
 _AXES = ("AccX", "AccY", "AccZ")
@@ -32,7 +32,6 @@ _CLIMB_LASTS_S = LIMITS.add("shortest such climb", 3.0, "s", "a choice: a gust o
 _GRAVITY = LIMITS.add("gravity", GRAVITY, "m/s^2", "physics")
 _OFF = LIMITS.add("gravity off, at rest", 0.5, "m/s^2", "a choice: a calibrated accelerometer is within 0.1")
 _FAR_OFF = LIMITS.add("gravity far off, at rest", 1.0, "m/s^2", "MPU-6000, not calibrated: 0.8 on one axis")
-_REST = LIMITS.add("throttle at rest", 0.2, "", "a choice: what armed motors idle at lies below, 0.15 of old firmware")
 _TRUE_P = LIMITS.add("probability that it is so", 0.8, "", "a choice: both are measured; which one is wrong is not")
 _LOST_P = LIMITS.add("probability that it costs the mission", 0.4, "", "a choice: the barometer corrects most of it")
 _SOURCES = (("EK3_SRC1_POSZ", 1.0), ("EK3_ALT_SOURCE", 0.0), ("EK2_ALT_SOURCE", 0.0))
@@ -118,7 +117,7 @@ def _holds_at(flight: Flight, t: Floats) -> Bools:
 def _not_gravity(flight: Flight, *, is_critical: bool) -> Iterator[Finding]:
     """Accelerometers that are far off gravity at rest: every climb rate that is estimated from them is wrong, though
     the barometer holds the height within its limit. Where one of several feels it, the others disagree with that."""
-    felt = _felt_at_rest(flight)
+    felt = flight.felt_at_rest
     if felt and abs(felt[0] - _GRAVITY) > _FAR_OFF and all(abs(one - _GRAVITY) > _OFF for one in felt):
         yield Finding(
             kind="imu",
@@ -191,28 +190,10 @@ def _goes_by_height(mode: Mode) -> bool:
 
 def _at_rest(flight: Flight) -> str:
     """That the accelerometers do not feel gravity before take-off, in a clause; empty where they do."""
-    felt = _felt_at_rest(flight)
+    felt = flight.felt_at_rest
     if not felt or abs(felt[0] - _GRAVITY) < _OFF:
         return ""
     return f"; at rest the accelerometers feel {felt[0]:.1f} m/s^2, gravity is {_GRAVITY:g}: calibrate them"
-
-
-def _felt_at_rest(flight: Flight) -> list[float]:
-    """What each sensor's accelerometers feel before the throttle is raised, m/s^2, the first one's first; none where
-    too little of that is recorded of it."""
-    driven, first = flight.throttle, flight.one("IMU", *_AXES)
-    if driven is None or first is None:
-        return []
-    lifted = driven[0][driven[1] > _REST]
-    until = lifted[0] if len(lifted) else np.inf
-    felt = [_felt(table.where(table.t < until)) for table in (first, *flight.all("IMU", *_AXES)[1:])]
-    return [] if felt[0] is None else [one for one in felt if one is not None]
-
-
-def _felt(standing: Table) -> float | None:
-    if len(standing) < _FEWEST:
-        return None
-    return float(median(np.sqrt(sum(standing[axis] ** 2 for axis in _AXES))))
 
 
 CHECK = Check("height", "an estimated height that runs away from the barometer's", READS, LIMITS, find)

@@ -196,10 +196,21 @@ def _landed(mission: Mission) -> Value:
     if len(heights) and (unseen := _unseen_end(mission)) is not None:
         return unseen
     low = bool(heights[-1] <= AIRBORNE_M) if len(heights) else _detected(mission, _LANDED)
-    low = low or flight_of(mission).stands_at_end
+    low = low or flight_of(mission).stands_at_end or _is_low_by_barometer(mission)
     if not low and flight_of(mission).kind in _GLIDES:
         return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
     return float(low or _stays_there(mission) or _rests(mission))
+
+
+def _is_low_by_barometer(mission: Mission) -> bool:
+    """Whether the barometer of a copter has it on the ground at the end, as where it was armed: an estimate that ran
+    away from it lifts nothing."""
+    flight = flight_of(mission)
+    if not flight.is_copter or flight.barometer is None:
+        return False
+    t, height = flight.barometer
+    last = height[(t > mission.end_s - _RESTS_S) & (t <= mission.end_s)]
+    return len(last) > 2 and float(np.max(np.abs(last))) < AIRBORNE_M
 
 
 def _stays_there(mission: Mission) -> bool:
