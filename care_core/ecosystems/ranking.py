@@ -163,8 +163,9 @@ def _led_to(root: Finding, others: Iterable[Finding], explains: Explains) -> lis
 
 
 def _failed_by_itself(root: Finding, finding: Finding) -> bool:
-    """Whether a part surely failed while the vehicle was set wrong, by no step from one to the other."""
-    return root.suspect == "parameter" and finding.suspect == "hardware" and finding.probability >= LIKELY
+    """Whether a part surely failed long after a setting began to tell, by no step from one to the other."""
+    surely = finding.suspect == "hardware" and finding.probability >= LIKELY
+    return surely and root.suspect == "parameter" and finding.onset_s > root.onset_s + UNLINKED_S
 
 
 def _only_set(cause: Finding, finding: Finding) -> bool:

@@ -100,6 +100,21 @@ def test_a_part_that_surely_failed_is_not_what_a_setting_led_to() -> None:
     assert root.kind == "laser"
 
 
+def test_a_part_that_fails_long_after_a_setting_began_to_tell_is_told_by_itself() -> None:
+    """A lack of thrust that a limit makes all along, and accelerometers that begin to shake: nothing leads from one to
+    the other but an attitude that was held."""
+    limited = replace(finding("laser", 7.0), suspect="parameter", parameters=("LIMIT",), end_s=160.0, probability=0.9)
+    shaken = replace(finding("control", 8.0 + UNLINKED_S), probability=0.9)
+    assert len(ranked([limited, shaken])) == 2
+    assert len(ranked([limited, replace(shaken, onset_s=9.0)])) == 1
+    assert len(ranked([replace(limited, suspect="hardware"), shaken])) == 1
+
+
+def test_of_findings_at_one_instant_the_cause_comes_first() -> None:
+    (root,) = ranked([finding("planner", 5.0), finding("laser", 5.0)])
+    assert root.kind == "laser"
+
+
 def test_a_symptom_is_told_after_a_cause_of_its_weight() -> None:
     assert [one.kind for one in rank_findings([finding("attitude", 1.0), finding("battery", 9.0)], explains={})] == [
         "battery",

@@ -18,10 +18,10 @@ from care_core.ecosystems.ros import ECOSYSTEM
 from care_core.ecosystems.ros.checks import imu as felt
 from care_core.ecosystems.ros.checks import messages, odometry, timing
 from care_core.ecosystems.ros.checks.messages import gist, reported
-from care_core.ecosystems.ros.messages import IMU, MESSAGES
+from care_core.ecosystems.ros.messages import IMU, MESSAGES, type_of
 from care_core.ecosystems.ros.motion import odometry_of
 from care_core.ecosystems.ros.node_messages import LogMessage, Report
-from care_core.logs.base import Table
+from care_core.logs.base import Channel, Table
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, RAYS, SCAN, SUCCEEDED, TWIST, Drive
@@ -1027,3 +1027,14 @@ def test_a_robot_that_drives_on_against_what_stands_before_it(
 
     titles = [one.title for one in every_finding(looked_at(changed(SCAN, against), tmp_path).findings)]
     assert ("it is told to drive on against what stands before it" in titles) is told
+
+
+@pytest.mark.parametrize(
+    ("topic", "is_place"),
+    [
+        ("/odom", True), ("/bluerov2/pose_gt", True), ("/preferred/odom", True), ("/mpc/reference", False),
+        ("/bluerov2/ekf/disturbance", False), ("/set_point/odom", False), ("/mpc/error", False),
+    ],
+)  # fmt: skip
+def test_what_is_asked_for_and_forces_are_no_odometry(topic: str, is_place: bool) -> None:
+    assert (type_of(Channel(topic, "nav_msgs/msg/Odometry", 1)) == "nav_msgs/Odometry") is is_place

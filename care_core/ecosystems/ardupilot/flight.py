@@ -109,6 +109,8 @@ class Flight(Airborne):
             return ()
         lean = np.interp(moved.t, *tilt)
         lifts = (np.interp(moved.t, *height) > OFF_GROUND_M) & during(self.flown, moved.t) & (moved["Status"] >= FIX)
+        rises = np.interp(moved.t + 1.0, *height) - np.interp(moved.t - 1.0, *height)
+        lifts &= np.abs(rises) < 2 * STANDS_MS  # what is held rises no faster than it goes
         if self.throttle is not None:  # what lies on its side with its motors down is held by nothing
             lifts &= np.interp(moved.t, *self.throttle) > _LIFTS
         follows = np.interp(moved.t, *error) < FOLLOWED_DEG

@@ -197,9 +197,16 @@ def reading(*types: str) -> Wanted:
     return {type: MESSAGES[type].reads for type in types}
 
 
+NO_PLACE = f"{ODOMETRY} of what is no place of the robot"
+_NO_PLACE = re.compile(r"(?:^|[/_])(?:ref|reference|set_?point|desired|error|disturbances?|wrench)(?:$|[/_])")
+"""What is asked for, and errors and forces, in a message for where a robot is."""
+
+
 def type_of(channel: Channel) -> str:
     """The key of `MESSAGES` for a channel, its short type where there is none."""
     name = short_name(channel.type.partition(",")[0])
+    if name == ODOMETRY and _NO_PLACE.search(channel.name):
+        return NO_PLACE
     return next((ending for ending in (ACTION_GOAL, ACTION_RESULT) if name.endswith(ending)), name)
 
 

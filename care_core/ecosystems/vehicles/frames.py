@@ -30,6 +30,16 @@ _BY_MOTORS = {4: _QUAD}
 """Classes that the number of motors alone tells; six could be a hexa or a Y6, eight an octa or an octaquad."""
 
 
+MOST_MOTORS = 8
+_MOTORS_OF_WORD: Mapping[str, int] = {"quad": 4, "hexa": 6, "y6": 6, "tri": 4}
+"""Outputs of a frame's motors, by its class as old firmware says it ("Frame: QUAD"); a tricopter's are 1, 2 and 4."""
+
+
+def motors_said(frame: str) -> int:
+    """The last output that drives a motor, as far as the firmware's word for its frame tells."""
+    return _MOTORS_OF_WORD.get(frame.casefold(), MOST_MOTORS)
+
+
 class Arm(NamedTuple):
     """A motor of a frame, factors at most 0.5. `level` is `upper` or `lower` where two motors share an arm."""
 

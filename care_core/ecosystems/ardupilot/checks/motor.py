@@ -25,6 +25,7 @@ from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.lost_motor import Commands, driven_hardest
 from care_core.ecosystems.spans import during, within
 from care_core.ecosystems.vehicles import Motor, motors_of
+from care_core.ecosystems.vehicles.frames import motors_said
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import Bools, Floats, median, pieces, quantile
 from care_core.records import Record
@@ -162,7 +163,7 @@ def _outputs(flight: Flight) -> _Outputs | None:
         return None
     motors = motors_of(flight.settings, flight.motor_outputs)
     if not motors and flight.is_copter:
-        motors = _nameless(table.columns)
+        motors = _nameless(table.columns, motors_said(flight.log.facts.get("frame", "")))
     columns = [_column(motor) for motor in motors]
     if len(columns) < 3 or not all(column in table.columns for column in columns):
         return None
@@ -176,10 +177,10 @@ def _column(motor: Motor) -> str:
     return f"C{motor.output}"
 
 
-def _nameless(columns: Mapping[str, Floats]) -> tuple[Motor, ...]:
-    """The motors of a frame that the parameters do not tell: outputs in use, of unknown place. The first four to eight
-    outputs move in flight, those of servos and unused ones do not."""
-    used = [n for n in range(1, 9) if (column := columns.get(f"C{n}")) is not None and np.ptp(column) > 100]
+def _nameless(columns: Mapping[str, Floats], last: int) -> tuple[Motor, ...]:
+    """The motors of a frame that the parameters do not tell: outputs in use up to the last one that may drive a motor,
+    of unknown place. The first four to eight outputs move in flight, those of servos and unused ones do not."""
+    used = [n for n in range(1, last + 1) if (column := columns.get(f"C{n}")) is not None and np.ptp(column) > 100]
     return tuple(Motor(n, n, 0.0, 0.0, 0.0, 0.0, "") for n in used) if len(used) >= 4 else ()
 
 
