@@ -431,7 +431,9 @@ def fault_sentence(objectives: Sequence[JudgedObjective], findings: Sequence[See
     first, *others = [clause for sentence in broken for clause in sentence.split("; ")] or found[:1]
     told = {log_time(one.onset_s) for one in worst if one.kind in ("attitude", "crash")}
     others = [one for one in others if not (one.startswith(_CAME_DOWN) and one.rpartition(" at ")[2] in told)]
-    clauses = list(dict.fromkeys((first, *found, *others)))
+    every = list(dict.fromkeys((first, *found, *others)))
+    clauses = [one for one in every if not any(other.startswith(f"{one} at ") for other in every)]
+    first = clauses[0]
     kept = _in_lines(clauses, LINES * LINE - len(f"{STATUS_WORDS['fault']}: ") - LINE // 8)
     onsets = [one.onset_s for one in worst if one.onset_s is not None and _with_time(one) in kept]
     begun_s = min(onsets, default=-math.inf)

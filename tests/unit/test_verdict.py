@@ -153,6 +153,11 @@ def test_how_it_came_down_is_told_once() -> None:
         f"1 of 3 waypoints were reached; {steered.title} at 27.3 s; battery failsafe at 27.3 s"
     )
     assert "it hit the ground at 27.3 s" in verdict_on([failed], [replace(steered, onset_s=20.0)]).failed
+    fast = [
+        ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", said)
+        for said in ("it hit the ground at 10.2 m/s", "it hit the ground at 10.2 m/s at 27.3 s")
+    ]
+    assert verdict_on(fast, []).failed == "it hit the ground at 10.2 m/s at 27.3 s"
 
 
 @pytest.mark.parametrize(
