@@ -311,11 +311,12 @@ def test_what_turned_over_and_was_disarmed_at_once_lies_on() -> None:
     assert first(made).title == "it tipped over at take-off"
 
 
-def test_what_tips_as_it_touches_down_with_its_throttle_cut_hit_nothing() -> None:
+@pytest.mark.parametrize("throttle", [0.0, 0.35], ids=["cut", "level and slow"])
+def test_what_tips_as_it_touches_down_hit_nothing(throttle: float) -> None:
     made = Made()
     tips = made.after(DOWN_S + 0.3)
     made.rows["ERR"] = [(DOWN_S + 2.5, {"Subsys": 12.0, "ECode": 1.0})]
-    made.table["CTUN"]["ThO"][made.t > DOWN_S - 0.1] = 0.0
+    made.table["CTUN"]["ThO"][made.t > DOWN_S - 0.1] = throttle
     made.table["CTUN"]["ThO"][made.after(DOWN_S - 3.0, DOWN_S - 0.2)] = HOVER
     made.table["ATT"]["Pitch"][tips] = 70.0
     made.lies(tips, 70.0)

@@ -32,6 +32,10 @@ _STICK_LEAST = LIMITS.add("pulse of a stick", 800.0, "us", "receivers send 800 t
 _ANSWERS_S = LIMITS.add("time in which a mode acts on the throttle", 0.5, "s", "a choice: motors answer sooner")
 _FALL_S = LIMITS.add("fall that may have begun in another mode", 2.0, "s", "free fall: 20 m")
 _SINKS_M = LIMITS.add("descent in the second before a mode that is a fall", 0.5, "m", "a choice: a landing is as fast")
+_LANDS_S = LIMITS.add("time in which it came down to land", 10.0, "s", "a choice: 5 m at LAND_SPEED as shipped")
+_LANDS_MS = LIMITS.add("descent of a landing", 2.0, "m/s", "a choice: four times LAND_SPEED as shipped")
+_LANDS_DEG = LIMITS.add("lean of a landing", 20.0, "deg", "a choice: wind and a pilot lean it by less")
+_TOUCHES_S = LIMITS.add("time in which it goes over as it touches the ground", 0.7, "s", "a choice: a fall over a leg")
 _TIPPED_P = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a choice: order, direction or propellers")
 _LEANS_DEG = LIMITS.add("lean that is asked for on the ground", 12.0, "deg", "a choice: more than a slope to start on")
 _LEANS_S = LIMITS.add("time in which that tips it over", 2.0, "s", "a choice: it goes over its gear in a second or two")
@@ -74,7 +78,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             "it went over with its motors turning, and lay on its back until it was disarmed" if over else "",
             "the sticks tell how fast it turns in this mode" if by_sticks else "",
             "no throttle was given since it was armed: does it estimate its attitude rightly?" if undriven else "",
-            "its throttle was down as it touched the ground" if landing else "",
+            _how_it_landed(flight, first) if landing else "",
             "a blow came before control was lost" if flight.blow_s is not None and not landing else "",
             "it turned over and did not fall: it lies on what it hit" if flight.is_caught else "",
         )
@@ -151,13 +155,36 @@ def _what(flight: Flight, steered: str, *, landing: bool) -> str:
 
 
 def _at_landing(flight: Flight, at: float) -> bool:
-    """Whether a copter that had flown was down with its throttle cut as it struck what turned it over: the ground."""
+    """Whether a copter that had flown was down as it turned over: with its throttle cut as it struck the ground, or
+    level and slow until it touched it."""
     driven, known, lost = flight.throttle, flight.height, flight.lost_control_s
     if driven is None or known is None or lost is None or not flight.is_copter or not flight.airborne:
         return False
     if not flight.airborne[0][0] < at or flight.ending_hit is not None:
         return False
-    return float(np.interp(at, *known)) < OFF_GROUND_M and float(np.interp(at, *driven)) < _IDLES
+    is_low = float(np.interp(at, *known)) < OFF_GROUND_M
+    return is_low and (float(np.interp(at, *driven)) < _IDLES or _touched_level(flight, min(at, lost)))
+
+
+def _how_it_landed(flight: Flight, at: float) -> str:
+    assert flight.throttle is not None
+    is_cut = float(np.interp(at, *flight.throttle)) < _IDLES
+    how = "its throttle was down" if is_cut else "it was level and slow"
+    return f"{how} as it touched the ground"
+
+
+def _touched_level(flight: Flight, at: float) -> bool:
+    """Whether it came down from above a person's chest as slowly as one lands, by its barometer, and leaned little
+    until it touched the ground."""
+    if flight.barometer is None or flight.tilt is None:
+        return False
+    t, height = flight.barometer
+    last = (t > at - _LANDS_S) & (t <= at)
+    if not last.any() or float(np.max(height[last])) < _LOW_M or float(np.interp(at, *flight.barometer)) > _LOW_M:
+        return False
+    sank = float(np.interp(at - 1.0, *flight.barometer) - np.interp(at, *flight.barometer))
+    leant = flight.tilt[1][(flight.tilt[0] > at - 2 * _LEANS_S) & (flight.tilt[0] <= at - _TOUCHES_S)]
+    return sank < _LANDS_MS and len(leant) > 2 and float(np.max(leant)) < _LANDS_DEG
 
 
 def _stranded(flight: Flight) -> Iterator[Finding]:
