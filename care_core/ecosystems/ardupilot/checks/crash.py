@@ -227,7 +227,9 @@ def _tipped(flight: Flight, at: float) -> bool:
         return False
     known, driven = flight.height, flight.throttle
     span = max(span[0], _last_stood(flight, at) or span[0]), span[1]
-    if _highest(known, span[0], at) > _LOW_M or _highest(flight.barometer, span[0], at) > _LOW_BY_BARO_M:
+    by_estimate, by_barometer = _highest(known, span[0], at), _highest(flight.barometer, span[0], at)
+    rose = by_estimate > _LOW_M and (flight.barometer is None or by_barometer > _LOW_M)
+    if rose or by_barometer > _LOW_BY_BARO_M:
         return False
     if driven is None:
         return known is not None
@@ -253,9 +255,11 @@ def _last_stood(flight: Flight, at: float) -> float | None:
     up = t[(t < at) & (throttle > _FIRST_THROTTLE)]
     if not len(up):
         return None
-    stood = (t < up[-1]) & (throttle < _FIRST_THROTTLE) & (np.interp(t, *flight.height) < OFF_GROUND_M)
+    low = np.interp(t, *flight.height) < OFF_GROUND_M
     if flight.barometer is not None:
-        stood &= np.interp(t, *flight.barometer) < _LOW_BY_BARO_M
+        by_barometer = np.interp(t, *flight.barometer)
+        low = (low & (by_barometer < _LOW_BY_BARO_M)) | (np.abs(by_barometer) < OFF_GROUND_M)
+    stood = low & (t < up[-1]) & (throttle < _FIRST_THROTTLE)
     if flight.tilt is not None:
         stood &= np.interp(t, *flight.tilt) < _UPRIGHT_DEG
     return max((end for start, end in runs(t, stood) if end - start >= _STANDS_S), default=None)
