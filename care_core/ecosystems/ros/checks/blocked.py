@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
@@ -29,6 +30,10 @@ FEWEST_RAYS = LIMITS.add("rays of a scan", 30, "", "fewer do not show a thing's 
 BESIDE = int(LIMITS.add("rays beside each that must have seen further", 2, "", "edges of what stood there before"))
 TURN_RAD = LIMITS.add("turn between the scans", 0.6, "rad", "what was ahead is still in sight of most scanners")
 LEVER_M = LIMITS.add("how far off the middle of the turn the laser sits", 0.4, "m", "where is not known: half a robot")
+LEAPS_M = LIMITS.add("way beyond that of its speeds", 0.25, "m", "odometry that leaps moves all that stands")
+LEAPS_RAD = LIMITS.add("turn beyond that of its speeds", 0.2, "rad", "the same, and what thin records leave out")
+LOOKS_S = LIMITS.add("how long after it is looked for", 10.0, "s", "a robot that turns looks back by then")
+STAYS = LIMITS.add("share of it that is still there", 0.5, "", "less is somebody who walked by")
 STUCK_S = LIMITS.add("time without getting further", 10.0, "s", "as Nav2's progress checker: movement_time_allowance")
 STUCK_M = LIMITS.add("way in that time", 0.5, "m", "as Nav2's progress checker: required_movement_radius")
 SOON_S = LIMITS.add("how soon the robot is stuck", 60.0, "s", "later something else has stopped it")
@@ -43,7 +48,7 @@ def find(drive: Drive) -> Iterator[Finding]:
         doubted_s = min((finding.onset_s for finding in faults(drive, scans)), default=np.inf)
         if scans.ranges.shape[1] < FEWEST_RAYS or scans.angles[0] == scans.angles[1]:
             continue
-        for row, points in _appeared(scans, _poses(odometry, scans.t)):
+        for row, points in _appeared(scans, _poses(odometry, scans.t), _driven(odometry, scans.t)):
             at = float(scans.t[row])
             if at >= doubted_s - 2 * BEFORE_S:
                 return
@@ -66,19 +71,45 @@ def find(drive: Drive) -> Iterator[Finding]:
             return
 
 
-def _appeared(scans: Scans, poses: Floats) -> Iterator[tuple[int, Floats]]:
-    """Scans with something new ahead that is still there in the next, with its points."""
+def _appeared(scans: Scans, poses: Floats, driven: Floats) -> Iterator[tuple[int, Floats]]:
+    """Scans with something new ahead that is still there when it is looked at next, with its points."""
     before = np.searchsorted(scans.t, scans.t - BEFORE_S, "right") - 1
     for row in range(len(scans.t)):
         earlier = int(before[row])
         if earlier < 0 or scans.t[row] - scans.t[earlier] > AT_MOST_S:
             continue
+        went = np.abs(poses[row] - poses[earlier])
+        way, turn = np.abs(driven[row] - driven[earlier])
+        if np.hypot(went[0], went[1]) > way + LEAPS_M or abs(went[2] - turn) > LEAPS_RAD:
+            continue  # a position that leaps moves all that stands
         points = _new_points(scans, poses, row, earlier)
-        if len(points) < RAYS:
-            continue
-        later = _new_points(scans, poses, min(row + 1, len(scans.t) - 1), earlier)
-        if len(later) >= RAYS and max(_width(scans, points), _width(scans, later)) >= WIDE_M:
+        is_wide = len(points) >= RAYS and _width(scans, points) >= WIDE_M
+        if is_wide and _stays(scans, poses, row, points):
             yield row, points
+
+
+def _stays(scans: Scans, poses: Floats, row: int, points: Floats) -> bool:
+    """Whether the next scan that looks there still sees something where points of a scan were."""
+    x, y, yaw = poses[row]
+    there_x = x + points[:, 0] * np.cos(yaw) - points[:, 1] * np.sin(yaw)
+    there_y = y + points[:, 0] * np.sin(yaw) + points[:, 1] * np.cos(yaw)
+    for later in range(row + 1, len(scans.t)):
+        if scans.t[later] - scans.t[row] > LOOKS_S:
+            break
+        away_x, away_y = there_x - poses[later, 0], there_y - poses[later, 1]
+        ray, _ = _rays(scans, np.arctan2(away_y, away_x) - poses[later, 2])
+        seen = (ray >= 0) & (ray < len(scans.angles))
+        if seen.sum() >= RAYS:
+            off = np.abs(scans.ranges[later][ray[seen]] - np.hypot(away_x, away_y)[seen])
+            return bool(np.mean(off < FREE_M) > STAYS)
+    return False
+
+
+def _rays(scans: Scans, bearing: Floats) -> tuple[NDArray[np.intp], float]:
+    """The ray that looks each way, outside of 0 to n - 1 where none does, and the angle from ray to ray."""
+    step = float(scans.angles[1] - scans.angles[0])
+    angle = (bearing + np.pi) % (2 * np.pi) - np.pi
+    return np.round((angle - scans.angles[0]) / step).astype(np.intp), step
 
 
 def _new_points(scans: Scans, poses: Floats, row: int, earlier: int) -> Floats:
@@ -93,8 +124,7 @@ def _new_points(scans: Scans, poses: Floats, row: int, earlier: int) -> Floats:
     ahead, aside = ahead[near], aside[near]
     world_x = x + ahead * np.cos(yaw) - aside * np.sin(yaw) - x0
     world_y = y + ahead * np.sin(yaw) + aside * np.cos(yaw) - y0
-    angle, step = (np.arctan2(world_y, world_x) - yaw0 + np.pi) % (2 * np.pi) - np.pi, scans.angles[1] - scans.angles[0]
-    ray = np.round((angle - scans.angles[0]) / step).astype(int)
+    ray, step = _rays(scans, np.arctan2(world_y, world_x) - yaw0)
     far = np.hypot(world_x, world_y)
     beside = BESIDE + np.ceil(LEVER_M * turn / np.maximum(far, LEVER_M) / abs(step)).astype(int)
     inside = (ray >= beside) & (ray < len(scans.angles) - beside)
@@ -118,6 +148,14 @@ def _poses(odometry: Odometry, t: Floats) -> Floats:
     columns = (odometry.x, odometry.y, np.unwrap(odometry.yaw))
     poses: Floats = np.stack([np.interp(t, odometry.t, column) for column in columns], axis=1)
     return poses
+
+
+def _driven(odometry: Odometry, t: Floats) -> Floats:
+    """Way and turn by odometry's own speeds until some times, shape (n, 2), m and rad."""
+    dt = np.diff(odometry.t, prepend=odometry.t[0])
+    sums = (np.cumsum(np.hypot(odometry.speed, odometry.sideways) * dt), np.cumsum(odometry.turn * dt))
+    driven: Floats = np.stack([np.interp(t, odometry.t, one) for one in sums], axis=1)
+    return driven
 
 
 def _stuck(odometry: Odometry, at: float) -> float | None:
