@@ -152,7 +152,7 @@ def _peer_of(one: Failure, tables: Path, known: dict[str, PlainClassifier | None
     assert one.case.reading is not None
     schema = one.case.reading.profile.schema
     if schema.name not in known:
-        table = next((path for path in sorted(tables.glob(f"{schema.name}.*"))), None)
+        table = next(iter(sorted(tables.glob(f"{schema.name}.*"))), None)
         known[schema.name] = None if table is None else classifier_of(read_table(table, schema), schema)
     return known[schema.name]
 

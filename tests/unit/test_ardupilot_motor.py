@@ -47,6 +47,30 @@ def test_a_lean_that_grows_while_it_stands_is_what_holds_it(from_deg: float, spe
     assert ("blocked" in [one.kind for one in made.find()]) == is_held
 
 
+@pytest.mark.parametrize(("climbs_ms", "is_held"), [(0.0, True), (2.0, False)])
+def test_what_climbs_as_it_leans_is_held_by_nothing(climbs_ms: float, is_held: bool) -> None:
+    """A copter that leans into a wind that has just begun, above one place, on its way up."""
+    made = Made()
+    leaning = made.after(FAILS_S, DOWN_S - 12.0)
+    made.table["ATT"]["Roll"][leaning] = made.table["ATT"]["DesRoll"][leaning] = 25.0
+    made.table["GPS"]["Spd"][leaning] = 0.05
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt"), ("BARO", "Alt"), ("BARO#2", "Alt")):
+        made.table[name][field][leaning] += climbs_ms * (made.t[leaning] - FAILS_S)
+    assert ("blocked" in [one.kind for one in made.find()]) == is_held
+
+
+@pytest.mark.parametrize(("frame", "is_motor"), [("QUAD", False), ("OCTA", True), ("", True)])
+def test_a_quad_of_old_firmware_has_no_fifth_motor(frame: str, is_motor: bool) -> None:
+    """No parameter tells its frame, and the outputs behind the motors turn a camera."""
+    made = Made()
+    made.settings = {name: value for name, value in made.settings.items() if name.startswith("MOT_")}
+    made.facts = {"firmware": "ArduCopter V3.3", "vehicle": "multicopter", "frame": frame}
+    outputs = made.table["RCOU"]
+    outputs["C5"] = np.where(made.after(FAILS_S), 2000.0, outputs["C1"])
+    outputs["C6"] = outputs["C1"].copy()
+    assert any("motor 5" in one.title for one in every_finding(made.find())) is is_motor
+
+
 def test_an_uneven_load_moves_motors_in_pairs_and_is_no_lost_motor() -> None:
     made = Made()
     for output in ("C1", "C3"):

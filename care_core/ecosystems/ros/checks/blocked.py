@@ -90,9 +90,7 @@ def _appeared(scans: Scans, poses: Floats, driven: Floats) -> Iterator[tuple[int
 
 def _stays(scans: Scans, poses: Floats, row: int, points: Floats) -> bool:
     """Whether the next scan that looks there still sees something where points of a scan were."""
-    x, y, yaw = poses[row]
-    there_x = x + points[:, 0] * np.cos(yaw) - points[:, 1] * np.sin(yaw)
-    there_y = y + points[:, 0] * np.sin(yaw) + points[:, 1] * np.cos(yaw)
+    there_x, there_y = _placed(poses[row], points[:, 0], points[:, 1])
     for later in range(row + 1, len(scans.t)):
         if scans.t[later] - scans.t[row] > LOOKS_S:
             break
@@ -105,6 +103,12 @@ def _stays(scans: Scans, poses: Floats, row: int, points: Floats) -> bool:
     return False
 
 
+def _placed(pose: Floats, ahead: Floats, aside: Floats) -> tuple[Floats, Floats]:
+    """Where points that lie so from a robot lie in the frame of its pose, m."""
+    x, y, yaw = pose
+    return x + ahead * np.cos(yaw) - aside * np.sin(yaw), y + ahead * np.sin(yaw) + aside * np.cos(yaw)
+
+
 def _rays(scans: Scans, bearing: Floats) -> tuple[NDArray[np.intp], float]:
     """The ray that looks each way, outside of 0 to n - 1 where none does, and the angle from ray to ray."""
     step = float(scans.angles[1] - scans.angles[0])
@@ -114,18 +118,17 @@ def _rays(scans: Scans, bearing: Floats) -> tuple[NDArray[np.intp], float]:
 
 def _new_points(scans: Scans, poses: Floats, row: int, earlier: int) -> Floats:
     """Points of a scan ahead of the robot that lie in what an earlier scan saw as free; shape (n, 2), m."""
-    (x, y, yaw), (x0, y0, yaw0) = poses[row], poses[earlier]
-    turn = abs(yaw - yaw0)
+    x0, y0, yaw0 = poses[earlier]
+    turn = abs(poses[row, 2] - yaw0)
     if turn > TURN_RAD:
         return np.empty((0, 2))
     ranges = scans.ranges[row].astype(np.float64)
     ahead, aside = ranges * np.cos(scans.angles), ranges * np.sin(scans.angles)
     near = np.isfinite(ranges) & (ahead > 0) & (ahead < AHEAD_M) & (np.abs(aside) < ASIDE_M)
     ahead, aside = ahead[near], aside[near]
-    world_x = x + ahead * np.cos(yaw) - aside * np.sin(yaw) - x0
-    world_y = y + ahead * np.sin(yaw) + aside * np.cos(yaw) - y0
-    ray, step = _rays(scans, np.arctan2(world_y, world_x) - yaw0)
-    far = np.hypot(world_x, world_y)
+    there_x, there_y = _placed(poses[row], ahead, aside)
+    ray, step = _rays(scans, np.arctan2(there_y - y0, there_x - x0) - yaw0)
+    far = np.hypot(there_x - x0, there_y - y0)
     beside = BESIDE + np.ceil(LEVER_M * turn / np.maximum(far, LEVER_M) / abs(step)).astype(int)
     inside = (ray >= beside) & (ray < len(scans.angles) - beside)
     free = np.array([

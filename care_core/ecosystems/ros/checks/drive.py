@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -404,30 +405,61 @@ def _pulling(drive: Drive, motion: Following) -> Iterator[Finding]:
     steady &= motion.speed_high - motion.speed_low < STEADY_MPS
     steady &= motion.turn_high - motion.turn_low < STEADY_RADPS
     rows = _spaced(odometry.t, np.flatnonzero(steady))
-    t, speed = odometry.t[rows], odometry.speed[rows]
     ordered: Floats = (motion.turn_high + motion.turn_low)[rows] / 2
-    pull: Floats = (odometry.turn[rows] - ordered) / speed
-    share: Floats = speed / motion.wanted_speed[rows]
-    for samples, least, agreeing in ((PULL_SAMPLES, PULL_RADPM, PULL_AGREE), (HARD_SAMPLES, HARD_RADPM, HARD_AGREE)):
-        if len(rows) < PULL_BEFORE + samples:
-            continue
-        windows = sliding_window_view(pull, samples)[PULL_BEFORE:]
-        middles = median(windows, axis=1)
-        agrees = np.mean(np.sign(windows) == np.sign(middles)[:, None], axis=1)
-        slower = median(sliding_window_view(share, samples)[PULL_BEFORE:], axis=1) < SLOWER
-        for number in np.flatnonzero((np.abs(middles) >= least) & (agrees >= agreeing) & slower).tolist():
-            first, middle = number + PULL_BEFORE, float(middles[number])
-            window, side = slice(first, first + samples), np.sign(middle)
-            always = float(median(pull[:first])) * side >= PULL_RADPM / 2
-            if always or _falls_short(pull[window] * side, ordered[window] * side):
-                continue
+    pull: Floats = (odometry.turn[rows] - ordered) / odometry.speed[rows]
+    driven = _Driven(odometry.t[rows], pull, odometry.speed[rows] / motion.wanted_speed[rows], ordered)
+    long = _pulled(driven, PULL_SAMPLES, PULL_RADPM, PULL_AGREE)
+    found = long or _pulled(driven, HARD_SAMPLES, HARD_RADPM, HARD_AGREE)
+    if found is not None:
+        evidence = (
+            f"turns {abs(found.radpm):.2f} rad per metre beyond its commands, {found.agrees:.0%} of samples agree"
+        )
+        side = "left" if found.radpm > 0 else "right"
+        span = found.since_s, float(driven.t[-1])
+        yield _finding(drive, f"the drive pulls to the {side}", span, evidence, probability=0.8)
+
+
+class _Driven(NamedTuple):
+    """Samples under a steady command, each of shape (n,)."""
+
+    t: Floats
+    pull: Floats
+    """Turn beyond the command, rad/m, positive to the left."""
+    share: Floats
+    """Of the commanded speed."""
+    ordered: Floats
+    """Turn of the command, rad/s."""
+
+
+class _Pull(NamedTuple):
+    """A pull to one side: since when, how much (rad/m, positive to the left), and how many of its samples agree."""
+
+    since_s: float
+    radpm: float
+    agrees: float
+
+
+def _pulled(driven: _Driven, samples: int, least: float, agreeing: float) -> _Pull | None:
+    """The first pull of so many samples after some without one, None where there is none.
+
+    Args:
+        least: turn beyond the commands, rad/m. agreeing: share of the samples that are to one side.
+    """
+    if len(driven.t) < PULL_BEFORE + samples:
+        return None
+    windows = sliding_window_view(driven.pull, samples)[PULL_BEFORE:]
+    middles = median(windows, axis=1)
+    agrees = np.mean(np.sign(windows) == np.sign(middles)[:, None], axis=1)
+    slower = median(sliding_window_view(driven.share, samples)[PULL_BEFORE:], axis=1) < SLOWER
+    for number in np.flatnonzero((np.abs(middles) >= least) & (agrees >= agreeing) & slower).tolist():
+        first, middle = number + PULL_BEFORE, float(middles[number])
+        window, side = slice(first, first + samples), np.sign(middle)
+        always = float(median(driven.pull[:first])) * side >= PULL_RADPM / 2
+        if not always and not _falls_short(driven.pull[window] * side, driven.ordered[window] * side):
             # It began where the sum of what is beyond half of it turns upwards.
-            above = np.cumsum(pull[: first + samples] * side - abs(middle) / 2)
-            span = float(t[int(np.argmin(above))]), float(t[-1])
-            beyond = f"turns {abs(middle):.2f} rad per metre beyond its commands, {agrees[number]:.0%} of samples agree"
-            to = "left" if middle > 0 else "right"
-            yield _finding(drive, f"the drive pulls to the {to}", span, beyond, probability=0.8)
-            return
+            above = np.cumsum(driven.pull[: first + samples] * side - abs(middle) / 2)
+            return _Pull(float(driven.t[int(np.argmin(above))]), middle, float(agrees[number]))
+    return None
 
 
 def _falls_short(pull: Floats, ordered: Floats) -> bool:
