@@ -3,8 +3,8 @@
 Each is a cause of one noisy-OR (`noisy_or`), with the probability that it is there and loses such a mission by itself:
 
 - a parameter: the share of the missions that its value alone takes from those that the rest keeps, before anything of
-  this run is known; what training may have missed of it, most where this run's symptoms point and training says least;
-  and what a finding says of it;
+  this run is known, and of those that meet what this run met; what training may have missed of it, most where this
+  run's symptoms point and training says least; and what a finding says of it;
 - a part, or what was met: the probability that it really failed, seeing this run's signals, times the probability that
   a mission fails with it;
 - chance: the share of the missions that the reference configuration loses, as counted and as learned;
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import ReferenceRuns
 from care_core.diagnose.estimates import (
     BY_CHANCE_REFUSED,
+    BY_THIS_RUN,
     DOUBT,
     LATE,
     LEARNED_WEIGHT,
@@ -70,6 +72,7 @@ UNNAMED = "chance, or what no log shows"
 NOT_SHOWN = "nothing that this log shows"
 """The same where it stands alone."""
 NONE_OUTSIDE: Mapping[str, float] = MappingProxyType({})
+_SMALL = 1e-9
 _ENDING: frozenset[FindingKind] = frozenset(("battery", "log"))
 """Kinds that end a run which goes on for too long."""
 _WHAT: Mapping[SuspectKind, What] = {"hardware": "hardware", "world": "world", "operation": "world"}
@@ -126,6 +129,7 @@ def failure_of(
         unlearned = float(before.epistemic_ratio([before.config], names)[0])
         pointed = _pointed_at(found)
         options = {n: _either(q, MISSED.value, unlearned * pointed.get(n, 0.0)) for n, q in options.items()}
+        options = _as_it_went(query, names, options)
         options = _set_wrong_by(findings, {n: 0.0 if n in arming.idle else q for n, q in options.items()})
     for finding in (one for one in findings if one.title in shown):
         for option, share in _named_by(finding, shown[finding.title].options, found).items():
@@ -210,26 +214,57 @@ def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Seque
     return {option: whole * share / total for option, share in weight.items() if total}
 
 
+class _ByTurns(NamedTuple):
+    """Probability that what broke is kept, as each option off its reference goes back by turns."""
+
+    off: list[str]
+    driven: float
+    back: float
+    """With all of them back."""
+    first: Floats
+    """With each as the only one that is back, shape (options,)."""
+    last: Floats
+    """With each as the only one that is off."""
+
+    @classmethod
+    def ask(cls, query: CounterfactualQuery, broken: Sequence[str]) -> _ByTurns:
+        off = deviating(query.config, query.reference)
+        back = back_at_reference(query, frozenset(off))
+        configs = [query.config, back, *(back_at_reference(query, frozenset((name,))) for name in off)]
+        kept = _kept(query, broken, [*configs, *({**back, name: query.config[name]} for name in off)])
+        return cls(off, float(kept[0]), float(kept[1]), kept[2 : 2 + len(off)], kept[2 + len(off) :])
+
+    def lost(self, first: Floats) -> dict[str, float]:
+        """What each option takes, in the mean of what it does as the first that goes back and as the last: where two
+        are needed to keep a mission, or two to lose it, one of the answers shows it."""
+        mean = (np.clip(first, 0.0, 1.0) + np.clip(1.0 - self.last / self.back, 0.0, 1.0)) / 2
+        return dict(zip(self.off, map(float, mean), strict=True))
+
+
 def _lost_by_options(before: CounterfactualQuery, broken: Sequence[str]) -> tuple[dict[str, float], float]:
     """What each option off its reference loses by itself, and what the reference loses, before anything of this run is
-    known.
-
-    An option is asked for twice, as the first that goes back and as the only one that is off: where two are needed to
-    keep a mission, or two to lose it, one of the answers shows it.
-    """
-    off = deviating(before.config, before.reference)
-    back = back_at_reference(before, frozenset(off))
-    configs = [before.config, back, *(back_at_reference(before, frozenset((name,))) for name in off)]
-    kept = _kept(before, broken, [*configs, *({**back, name: before.config[name]} for name in off)])
-    first = 1.0 - kept[0] / kept[2 : 2 + len(off)]
-    only = 1.0 - kept[2 + len(off) :] / kept[1]
-    lost = (np.clip(first, 0.0, 1.0) + np.clip(only, 0.0, 1.0)) / 2
-    return dict(zip(off, map(float, lost), strict=True)), _chance(1.0 - float(kept[1]), before.model.training.reference)
+    known."""
+    turns = _ByTurns.ask(before, broken)
+    lost = turns.lost(1.0 - turns.driven / turns.first)
+    return lost, _chance(1.0 - turns.back, before.model.training.reference)
 
 
-def _kept(before: CounterfactualQuery, broken: Sequence[str], configs: Sequence[Mapping[str, float]]) -> Floats:
+def _as_it_went(
+    query: CounterfactualQuery, broken: Sequence[str], options: Mapping[str, float]
+) -> Mapping[str, float]:
+    """The options with what each loses of missions that meet what this run met, where that is more: a run that was
+    slow where its option makes it slow says more than that option's missions do together."""
+    if not query.model.outcomes.keys() & broken:
+        return options
+    turns = _ByTurns.ask(query, broken)
+    lost = turns.lost((turns.first - turns.driven) / max(1.0 - turns.driven, _SMALL))
+    weight = BY_THIS_RUN.value
+    return {name: max(q, (1.0 - weight) * q + weight * lost.get(name, 0.0)) for name, q in options.items()}
+
+
+def _kept(query: CounterfactualQuery, broken: Sequence[str], configs: Sequence[Mapping[str, float]]) -> Floats:
     """Probability that what broke is kept, shape (m,), off 0; a coin's toss where training had too few runs to say."""
-    odds = before.all_kept([name for name in broken if name in before.model.outcomes], configs)
+    odds = query.all_kept([name for name in broken if name in query.model.outcomes], configs)
     return np.full(len(configs), 0.5) if odds is None else np.clip(odds, 1e-4, 1.0)
 
 
