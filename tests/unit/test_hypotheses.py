@@ -9,14 +9,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.diagnose.estimates import UNMODELLED
-from care_core.diagnose.hypotheses import UNTOLD_BY_FIT, hypotheses_of, hypotheses_without_model, with_findings
+from care_core.diagnose.hypotheses import (
+    UNTOLD_BY_FIT,
+    Arming,
+    failure_of,
+    hypotheses_of,
+    hypotheses_without_model,
+    with_findings,
+)
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, NoisyOr
 from care_core.diagnose.parts import OUTLASTED
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import SAGS, UNCHARGED, Finding, FindingKind, Severity, SuspectKind
+from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.run import Evidence
 from care_core.variables import Role, Threshold, Variable
+from tests.planted import BOUNDS, CALM, TIME, planted_run, query_of
 
 
 def finding(
@@ -79,6 +88,20 @@ def test_a_part_that_surely_failed_leads_over_a_doubtful_parameter() -> None:
     found = weigh({"LAND_SPEED": 0.3}, 0.02, [finding(0.9)])
     assert lead(found) == ("hardware", "motor 2 lost thrust")
     assert weigh({"LAND_SPEED": 0.03}, 0.02, [finding(0.9)])[0].probability > 0.8
+
+
+def test_an_option_with_which_this_run_failed_counts_for_more_than_in_any_mission(planted: Profile) -> None:
+    """At 3.2 m/s half of the missions are too slow; this one planned anew too often, and faster it would have kept."""
+    run = planted_run({**CALM, "replans": 3.0}, speed=3.2)
+    missed = ObjectiveResult(TIME, 183.7, BOUNDS["time"], "fault")
+
+    def loses(observed: Mapping[str, object] | None) -> float:
+        query = query_of(planted, run, observed)
+        failure = failure_of(query, [missed], {}, Arming(frozenset(), frozenset()), (), {})
+        return failure.loses["parameter", "speed"]
+
+    in_any, in_this = loses({}), loses(None)
+    assert in_any + 0.1 < in_this < 0.9
 
 
 def test_two_causes_may_both_have_acted() -> None:
