@@ -129,7 +129,7 @@ def failure_of(
         unlearned = float(before.epistemic_ratio([before.config], names)[0])
         pointed = _pointed_at(found)
         options = {n: _either(q, MISSED.value, unlearned * pointed.get(n, 0.0)) for n, q in options.items()}
-        options = _as_it_went(query, names, options)
+        options = _as_it_went(query, names, options, _unspoken(findings))
         options = _set_wrong_by(findings, {n: 0.0 if n in arming.idle else q for n, q in options.items()})
     for finding in (one for one in findings if one.title in shown):
         for option, share in _named_by(finding, shown[finding.title].options, found).items():
@@ -250,16 +250,27 @@ def _lost_by_options(before: CounterfactualQuery, broken: Sequence[str]) -> tupl
 
 
 def _as_it_went(
-    query: CounterfactualQuery, broken: Sequence[str], options: Mapping[str, float]
+    query: CounterfactualQuery, broken: Sequence[str], options: Mapping[str, float], unspoken: float
 ) -> Mapping[str, float]:
     """The options with what each loses of missions that meet what this run met, where that is more: a run that was
-    slow where its option makes it slow says more than that option's missions do together."""
+    slow where its option makes it slow says more than that option's missions do together.
+
+    Args:
+        unspoken: probability that what this run met is nothing that the log shows: what came of that would be laid to
+            options.
+    """
     if not query.model.outcomes.keys() & broken:
         return options
     turns = _ByTurns.ask(query, broken)
     lost = turns.lost((turns.first - turns.driven) / max(1.0 - turns.driven, _SMALL))
-    weight = BY_THIS_RUN.value
+    weight = BY_THIS_RUN.value * unspoken
     return {name: max(q, (1.0 - weight) * q + weight * lost.get(name, 0.0)) for name, q in options.items()}
+
+
+def _unspoken(findings: Sequence[Finding]) -> float:
+    """Probability that nothing which the log shows lost the run, whatever brought that about."""
+    shown = (one for one in _acting(findings) if one.severity != "info" and one.suspect in _WHAT)
+    return float(np.prod([1.0 - mission_lost(one) for one in shown]))
 
 
 def _kept(query: CounterfactualQuery, broken: Sequence[str], configs: Sequence[Mapping[str, float]]) -> Floats:
