@@ -129,8 +129,9 @@ def failure_of(
         unlearned = float(before.epistemic_ratio([before.config], names)[0])
         pointed = _pointed_at(found)
         options = {n: _either(q, MISSED.value, unlearned * pointed.get(n, 0.0)) for n, q in options.items()}
-        options = _as_it_went(query, names, options, _unspoken(findings))
         options = _set_wrong_by(findings, {n: 0.0 if n in arming.idle else q for n, q in options.items()})
+        able = {n: q for n, q in options.items() if n not in arming.idle}
+        options |= _as_it_went(query, names, able, _unspoken(findings))
     for finding in (one for one in findings if one.title in shown):
         for option, share in _named_by(finding, shown[finding.title].options, found).items():
             options[option] = _either(options.get(option, 0.0), share)
@@ -250,8 +251,8 @@ def _lost_by_options(before: CounterfactualQuery, broken: Sequence[str]) -> tupl
 
 
 def _as_it_went(
-    query: CounterfactualQuery, broken: Sequence[str], options: Mapping[str, float], unspoken: float
-) -> Mapping[str, float]:
+    query: CounterfactualQuery, broken: Sequence[str], options: dict[str, float], unspoken: float
+) -> dict[str, float]:
     """The options with what each loses of missions that meet what this run met, where that is more: a run that was
     slow where its option makes it slow says more than that option's missions do together.
 
