@@ -56,8 +56,8 @@ MISSED = _by_hand(
 BY_THIS_RUN = _by_hand(
     0.5,
     "weight of what an option takes from missions as this run went beside what it takes from any, where that is more",
-    "at 0 and 0.25 the Brier score of 415 flown resets is 0.0502 and 0.0497 in place of 0.0499; at 0 promises to planted "
-    "robots say 0.67 where 0.89 is true, with it 0.73",
+    "at 0 and 0.25 the Brier score of 415 flown resets is 0.0502 and 0.0497 in place of 0.0499; at 0 promises to "
+    "planted robots say 0.67 where 0.89 is true, with it 0.73",
 )
 UNMODELLED = _by_hand(
     0.02,
