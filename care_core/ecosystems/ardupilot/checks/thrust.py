@@ -44,7 +44,9 @@ _CLIMBS_MS = LIMITS.add("climb of what has thrust to spare", 1.0, "m/s", "a choi
 _GROUNDED_S = LIMITS.add("full throttle on the ground", 5.0, "s", "a choice: a take-off takes less")
 SPIN_MOST = LIMITS.add("MOT_SPIN_MAX that keeps motors down", 0.9, "", "AP_MotorsMulticopter: 0.95 as shipped")
 _FLYING = LIMITS.add("least throttle in the air", 0.05, "", "a choice: above it motors turn")
-_LACKS_P = LIMITS.add("probability where it sinks with nearly all", 0.7, "", "a choice: its own wash sinks it as well")
+_LACKS_P = LIMITS.add(
+    "probability where it sinks with nearly all, or has hovered at too much", 0.7, "", "a choice: its own wash sinks it too"
+)
 _PROBABILITY: Mapping[SuspectKind, float] = {
     "hardware": LIMITS.add(
         "probability of a weak part", 0.3, "", "7 of 83 such training flights have one, and those vary little in weight"
@@ -93,9 +95,15 @@ def _too_little(flight: Flight, full: list[Span], begin: float, before: float) -
     since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""
     evidence = f"throttle above {since}{100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
     evidence += f", {below:.1f} m below the height wanted" if below else ""
-    evidence += f"; until then it flew at {100 * before:.0f} %"
+    evidence += _until_then(before)
     severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
-    return _finding(flight, "too little thrust", (begin, end), severity, evidence)
+    found = _finding(flight, "too little thrust", (begin, end), severity, evidence)
+    is_heavy = before > HOVER_MOST and lasted > _LASTS_S
+    return replace(found, probability=max(found.probability, _LACKS_P)) if is_heavy else found
+
+
+def _until_then(before: float) -> str:
+    return f"; before that the throttle was at {100 * before:.0f} %"
 
 
 def _sinks(flight: Flight, sinking: list[Span], before: float) -> Finding:
@@ -103,7 +111,7 @@ def _sinks(flight: Flight, sinking: list[Span], before: float) -> Finding:
     start, end = sinking[0][0], sinking[-1][1]
     evidence = (
         f"throttle above {100 * _NEARLY_FULL:.0f} % for {seconds_in(sinking):.0f} s from {log_time(start, 0)} on, and "
-        f"it sank by {_sank_m(flight, *sinking[0]):.1f} m at that; until then it flew at {100 * before:.0f} %"
+        f"it sank by {_sank_m(flight, *sinking[0]):.1f} m at that{_until_then(before)}"
     )
     found = _finding(flight, "too little thrust", (start, end), "critical", evidence)
     return replace(found, probability=max(found.probability, _LACKS_P))
