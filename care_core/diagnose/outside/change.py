@@ -64,16 +64,19 @@ def leading_outside(
     if finding is None and suspect is None:
         return None
     is_learned = suspect is not None and suspect.is_learned and meaning is not None and meaning.role in FROM_FLIGHTS
+    # What names several parameters gives each a share; together they are what it says.
+    named = {first.name} if finding is None else {first.name, *finding.parameters}
+    acted = sum(one.probability for one in hypotheses if one.what == "parameter" and one.name in named)
     is_carried = (measured is not None or is_learned) and not _is_kept(first.name, vehicle_of_run(run).kind)
     return Advisable(
         first.name,
         float(setting.value),
         wanted,
         in_words,
-        first.probability,
+        acted,
         finding.title if finding is not None else suspect.text if suspect is not None else "",
         is_found=finding is not None,
-        is_advised=is_carried and wanted not in (None, setting.value) and first.probability >= ENOUGH,
+        is_advised=is_carried and wanted not in (None, setting.value) and acted >= ENOUGH,
     )
 
 
