@@ -112,9 +112,15 @@ def linked(
 ) -> tuple[tuple[str, tuple[T, ...]], ...]:
     """What is folded under a finding, by the words for how it hangs together; without empty ones."""
     since_s = math.inf if onset_s is None else onset_s
-    later = tuple(one for one in followed_by if one.onset_s is None or one.onset_s >= since_s)
-    before = tuple(one for one in followed_by if one not in later)
-    links = (("led to", tuple(consequences)), ("followed by", later), ("seen just before it", before))
+    at_once = tuple(one for one in followed_by if one.onset_s == since_s)
+    later = tuple(one for one in followed_by if one.onset_s is None or one.onset_s > since_s)
+    before = tuple(one for one in followed_by if one not in (*at_once, *later))
+    links = (
+        ("led to", tuple(consequences)),
+        ("at the same time", at_once),
+        ("followed by", later),
+        ("seen just before it", before),
+    )
     return tuple(link for link in links if link[1])
 
 

@@ -138,6 +138,7 @@ def _fix(report: Report, fix: FixEntry, drawing: Drawing) -> dict[str, Any]:
     rows = [(name, objectives[name].prediction(one), one.odds(fix.guess)) for name, one in fix.predicted.items()]
     others = [other.sentence(report.odds_as_driven) for other in fix.alternatives]
     return {
+        "changes": list(map(str, fix.changes)),
         "rows": rows,
         "responses": drawing.responses,
         "diff": report.diff.splitlines(),

@@ -97,7 +97,7 @@ def _causes(names: list[str], causes: list[CauseEntry], unlikely: list[str], as_
     lines = [line for cause in causes for line in _cause(cause, as_driven)]
     if unlikely:
         lines += [*([""] if lines else []), below([f"`{name}`" for name in unlikely], after=len(causes))]
-    yield from lines or ["None is likely among the parameters of the profile."]
+    yield from lines or ["None of the profile's parameters is likely."]
 
 
 def _cause(cause: CauseEntry, as_driven: float | None) -> Iterator[str]:
@@ -107,7 +107,7 @@ def _cause(cause: CauseEntry, as_driven: float | None) -> Iterator[str]:
 
 def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
     objectives = {objective.name: objective for objective in report.objectives}
-    yield from ("", "## Fix", "")
+    yield from ("", "## Fix", "", *(f"- change {escaped(str(change))}" for change in fix.changes))
     for name, predicted in fix.predicted.items():
         told = filter(None, (objectives[name].prediction(predicted), predicted.odds(fix.guess)))
         yield f"- `{name}` {', '.join(told)}"

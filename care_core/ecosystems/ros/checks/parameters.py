@@ -17,6 +17,7 @@ from care_core.ecosystems.ros.node_messages import Level, LogMessage
 from care_core.ecosystems.ros.recoveries import repairs
 from care_core.logs.base import Table
 from care_core.numbers import median
+from care_core.records import replace
 from care_core.run import Setting
 
 LIMITS = Limits()
@@ -217,10 +218,10 @@ def _answers(drive: Drive, held: Held) -> Iterator[Finding]:
     last, server = lost[-1]
     evidence = f"{len(unanswered)} wait{'' if len(unanswered) == 1 else 's'} for an answer ran out"
     if short:
-        yield _finding(
-            drive, "software", short, f"{server} did not answer in so many ms, and the goal was given up",
-            f"{evidence}; a longer wait costs nothing where answers come", "/rosout", 0.7, wanted=ENOUGH_MS,
-        )  # fmt: skip
+        what = f"{server} did not answer in that many ms, and the goal was given up"
+        why = f"{evidence}; a longer wait costs nothing where answers come"
+        found = _finding(drive, "software", short, what, why, "/rosout", 0.7, wanted=ENOUGH_MS)
+        yield replace(found, onset_s=lost[0][0].time_s)
         return
     waits = "; ".join(f"default_server_timeout is {one.value} ms" for one in settings)
     yield Finding(
