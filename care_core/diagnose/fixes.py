@@ -21,9 +21,10 @@ BEAM = 8
 GAIN_FOR_ONE_MORE = 0.1
 """Probability that one more change, the first included, must add: each is something an operator has to do and to
 believe."""
-NEEDED = 0.5
-"""Share of its odds that a set keeps without one of its changes, up to which that is among them: the run is likelier to
-be lost without it than not."""
+NEEDED = 0.8
+"""Share of its odds that a set keeps without one of its changes, up to which that is among them. At 0.5 (it is likelier
+needed than not) 121 failures of copters, rovers, move_base and PX4 took 1.61 missions in the mean until repaired, at 0.8
+1.59, and planted robots met all after 0.89 of the changes in place of 0.92."""
 DISTANCE_COST = 0.02
 """Probability given up for leaving a value where it is rather than moving it across its whole range."""
 NEARLY = 0.02
@@ -194,7 +195,7 @@ def _ranked(query: CounterfactualQuery, sets: Sequence[Assignment]) -> list[tupl
 
 
 def smallest_good(found: list[tuple[Assignment, float]]) -> int:
-    """Index of the set to suggest: one more change only where it is likelier needed than not."""
+    """Index of the set to suggest: one more change only where it adds enough."""
     chosen = 0
     for i in range(1, len(found)):
         if is_needed(found[chosen][1], found[i][1], more=i - chosen):

@@ -87,7 +87,8 @@ def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs
     """What every objective should become, as bars of how likely each is kept."""
     if fix.changes and not fix.predicted:
         named = listed([clean(change.option.name) for change in fix.changes])
-        return [Row(Content(f"No values are predicted: training says nothing of {named} here."))]
+        known = " The odds are those of what explains this failure." if fix.p_fixed is not None else ""
+        return [Row(Content(f"No values are predicted: the profile did not learn what {named} does.{known}"))]
     width = max((len(clean(result.variable.name)) for result in objectives), default=0)
     rows = []
     for result in objectives:
