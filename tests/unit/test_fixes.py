@@ -167,7 +167,8 @@ def test_the_best_value_alone(planted: Profile) -> None:
     [
         ([0.8], 0),
         ([0.8, 0.85], 0),
-        ([0.5, 0.65], 0),
+        ([0.5, 0.65], 1),
+        ([0.7, 0.82], 0),
         ([0.3, 0.65], 1),
         ([0.3, 0.35, 0.75], 2),
         ([0.3, 0.65, 0.7], 1),
@@ -175,7 +176,7 @@ def test_the_best_value_alone(planted: Profile) -> None:
         ([0.4, 0.3, 0.2], 0),
     ],
 )
-def test_one_more_change_is_likelier_needed_than_not(probability: list[float], chosen: int) -> None:
+def test_one_more_change_adds_a_tenth_and_a_quarter(probability: list[float], chosen: int) -> None:
     assert smallest_good([({str(j): 0.0 for j in range(i + 1)}, p) for i, p in enumerate(probability)]) == chosen
 
 
