@@ -102,7 +102,7 @@ class Comparison(Record):
     """In order of time."""
     findings: tuple[FindingPair, ...]
     departures: tuple[Departure, ...] = ()
-    """Signals that go apart, in order of time."""
+    """Signals that diverge, in order of time."""
 
 
 def compare_runs(

@@ -23,8 +23,8 @@ GAIN_FOR_ONE_MORE = 0.1
 believe."""
 NEEDED = 0.8
 """Share of its odds that a set keeps without one of its changes, up to which that is among them. Of 73 failures of
-copters, rovers, move_base and PX4 what is advised holds a set that repaired the run in 60, and one change more than that
-in 15 (at 0.5: 58 and 7); planted robots meet everything after 0.92 of the changes (0.89)."""
+copters, rovers, move_base and PX4 what is advised holds a set that repaired the run in 60, and one change more than
+that in 15 (at 0.5: 58 and 7); planted robots meet everything after 0.92 of the changes (0.89)."""
 DISTANCE_COST = 0.02
 """Probability given up for leaving a value where it is rather than moving it across its whole range."""
 NEARLY = 0.02

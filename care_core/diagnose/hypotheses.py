@@ -54,7 +54,7 @@ from care_core.ecosystems.findings import (
     every_finding,
 )
 from care_core.ecosystems.ranking import LIKELY, may_refuse
-from care_core.numbers import Floats
+from care_core.numbers import Floats, six_digits
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.run import Evidence, FitVerdict
@@ -150,6 +150,7 @@ def failure_of(
 def hypotheses_of(failure: NoisyOr) -> tuple[Hypothesis, ...]:
     """Every explanation, the likeliest first: the probability that it acted and none above it did; they add up to 1.
     What is less likely than `LEAST` is told with what the profile does not know, or with chance where it knows nothing.
+    They are as a report keeps them, so that it says the same when it is read again.
     """
     told = {key: (1.0 - DOUBT.value) * share for key, share in failure.ranking().items()}
     rest = UNKNOWN if UNKNOWN in told else CHANCE
@@ -157,7 +158,9 @@ def hypotheses_of(failure: NoisyOr) -> tuple[Hypothesis, ...]:
     shares[rest] = 1.0 - sum(shares.values())
     ranked = sorted(shares.items(), key=lambda entry: (-entry[1], entry[0]))
     return tuple(
-        Hypothesis(what, name, share, max(share, (1.0 - DOUBT.value) * failure.acts((what, name))))
+        Hypothesis(
+            what, name, six_digits(share), six_digits(max(share, (1.0 - DOUBT.value) * failure.acts((what, name))))
+        )
         for (what, name), share in ranked
     )
 

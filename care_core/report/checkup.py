@@ -38,6 +38,10 @@ def doctor_document(version: str, checks: Sequence[CheckEntry]) -> DoctorDocumen
     return DoctorDocument(version=version, status=worst, checks=list(checks))
 
 
+def _things(count: int) -> str:
+    return f"{count} thing{'' if count == 1 else 's'}"
+
+
 def doctor_text(document: DoctorDocument) -> str:
     """The check-up in lines: what is so, and below it what to do."""
     return "\n".join(_lines(document)) + "\n"
@@ -52,6 +56,6 @@ def _lines(document: DoctorDocument) -> Iterator[str]:
     counts = {status: sum(check.status == status for check in document.checks) for status in ("warn", "fail")}
     yield ""
     if document.status == "fail":
-        yield f"{counts['fail']} to repair, {counts['warn']} to know of"
+        yield f"{counts['fail']} to repair, {_things(counts['warn'])} to know"
     else:
-        yield f"care {document.version} works here" + (f", {counts['warn']} to know of" if counts["warn"] else "")
+        yield f"care {document.version} works here" + (f", {_things(counts['warn'])} to know" if counts["warn"] else "")

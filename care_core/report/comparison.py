@@ -189,7 +189,7 @@ def sections_of(document: CompareDocument) -> list[Section]:
     found = [
         _section("Parameters that differ", ("", "A", "B"), _parameters(document), PARAMETERS_SHOWN),
         _section("Objectives", ("", "A", "B"), _objectives(document), PARAMETERS_SHOWN),
-        _section("Signals that go apart", ("", "at", "A", "B"), _departures(document), PARAMETERS_SHOWN),
+        _section("Signals that diverge", ("", "at", "A", "B"), _departures(document), PARAMETERS_SHOWN),
         _section("What happened, seconds from the start", ("", "A", "B"), _events(document), EVENTS_SHOWN),
         _section("Measures, the most different first", ("", "A", "B", "apart"), _measures(document), MEASURES_SHOWN),
         _section("Findings", ("", "A", "B"), _findings(document), FINDINGS_SHOWN),

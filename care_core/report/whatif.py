@@ -171,7 +171,7 @@ def _predicted(question: Question, answer: Answer) -> Iterator[str]:
     for outlook in answer.outlooks:
         yield from wrapped(_outlook(outlook, answer.is_guess), f"{outlook.objective.variable.name:<{width}}  ")
     if any(o.objective.variable.kind == "functional" and o.predicted.status() == "fault" for o in answer.outlooks):
-        yield from wrapped("The mission is likely to fail; the other values are those of a mission that does not.")
+        yield from wrapped("The mission is likely to fail; the other values are those of one that succeeds.")
     yield ""
     yield from wrapped(
         f"{chance(answer.p_ok, answer.is_guess)} that all objectives are met with the change, "

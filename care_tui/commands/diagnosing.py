@@ -112,7 +112,7 @@ def triage(
         raise typer.Exit(_write_junit(request, sharing, out, force=force, no_history=no_history))
     try:
         if len(found) > len(logs or found):
-            raise NoRepeatsError("A folder of several logs is no one run.", hint="Name one of them.")
+            raise NoRepeatsError("The folder holds several logs.", hint="Name one of them.")
         with Progress() as progress:
             case = api.triage(request, progress)
     except (LogError, NoRepeatsError) as err:

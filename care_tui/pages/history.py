@@ -168,7 +168,7 @@ class HistoryPage(FiguredPage):
             rows.append(labelled("Cause", past.cause))
         if past.report.fix is not None:
             rows.append(labelled("Advice", past.advice))
-        return rows + [labelled("" if place else "Became of it", told) for place, told in enumerate(past.became)]
+        return rows + [labelled("" if place else "Outcome", told) for place, told in enumerate(past.became)]
 
     def _changes(self, past: Past) -> list[Row]:
         """What was set otherwise than in the run before."""

@@ -225,7 +225,7 @@ def test_what_swung_until_control_was_lost_has_no_motor_to_check() -> None:
 @pytest.mark.parametrize(("severity", "is_pack"), [("warning", False), ("critical", True)])
 def test_a_battery_that_held_comes_after_what_ended_the_run(severity: Severity, *, is_pack: bool) -> None:
     link = Finding("radio", "the radio link was lost", 50.0, 60.0, "critical", "", "", probability=0.9)
-    empty = Finding("battery", "the battery was not charged", 0.0, 60.0, severity, "", "", probability=0.9)
+    empty = Finding("battery", "the battery was only partly charged", 0.0, 60.0, severity, "", "", probability=0.9)
     told = (empty, link) if is_pack else (link, empty)
     rivals = Hypothesis("hardware", link.title, 0.55), Hypothesis("hardware", empty.title, 0.4)
     ended = replace(failed(*told), hypotheses=rivals)
@@ -240,12 +240,12 @@ def test_a_battery_that_held_comes_after_what_ended_the_run(severity: Severity, 
 
 
 def test_where_nothing_failed_no_part_is_named() -> None:
-    empty = Finding("battery", "the battery was not charged", 0.0, 60.0, "warning", "", "", probability=0.9)
+    empty = Finding("battery", "the battery was only partly charged", 0.0, 60.0, "warning", "", "", probability=0.9)
     assert next_step(failed(empty), has_failed=False) == ""
 
 
 def test_what_can_be_put_right_at_once_comes_first() -> None:
-    empty = Finding("battery", "the battery was not charged", 0.0, 60.0, "critical", "", "", probability=0.9)
+    empty = Finding("battery", "the battery was only partly charged", 0.0, 60.0, "critical", "", "", probability=0.9)
     assert next_step(failed(empty), has_failed=True) == "charge or replace the battery"
     refused = Finding("prearm", "arming was refused: Check ANGLE_MAX", 0.0, 9.0, "critical", "", "", "parameter", 0.3)
     assert next_step(failed(refused), has_failed=True) == "clear what refused arming: Check ANGLE_MAX"

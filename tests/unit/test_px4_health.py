@@ -431,7 +431,7 @@ def test_a_battery_is_told_by_its_charge_and_by_its_fall_under_load() -> None:
         }, BAT1_N_CELLS=4.0)  # fmt: skip
 
     assert flown(1.0, 16.1) == []
-    assert flown(0.3, 16.1) == [("battery", "the battery was not charged", 10.0)]
+    assert flown(0.3, 16.1) == [("battery", "the battery was only partly charged", 10.0)]
     assert flown(1.0, 12.5) == [("battery", "the battery's voltage falls under load", 10.0)]
 
 
@@ -484,7 +484,7 @@ def test_a_battery_that_keeps_it_from_arming_is_the_battery() -> None:
                                  (9.0, "WARNING", "[commander] Arming denied: Resolve system health failures first")),
     })))  # fmt: skip
     found = {one.title for root in health.findings for one in (root, *root.below)}
-    assert {"the battery was not charged", "not ready to fly: Low battery level"} <= found
+    assert {"the battery was only partly charged", "not ready to fly: Low battery level"} <= found
 
 
 def test_a_rover_that_is_driven_and_stands_is_told_with_what_its_driver_says() -> None:

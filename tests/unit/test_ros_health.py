@@ -515,13 +515,14 @@ def test_no_greatest_speed_is_told_that_is_less_than_it_went(tmp_path: Path) -> 
     def slowly(message: Any, _time_s: float) -> None:
         message.twist.twist.linear.x *= 0.2
 
-    (said,) = [one for one in looked_at(changed(ODOMETRY, slowly), tmp_path).timeline if "m in all" in one.text]
-    assert "at most" not in said.text
+    (said,) = [one for one in looked_at(changed(ODOMETRY, slowly), tmp_path).timeline if "drove " in one.text]
+    assert "at its fastest" not in said.text
 
 
 def test_the_greatest_speed_that_is_told_lasted(tmp_path: Path) -> None:
-    (said,) = [one for one in looked_at(changed(ODOMETRY, in_spikes), tmp_path).timeline if "at most" in one.text]
-    assert "0.5" in said.text.partition("m in all, ")[2]
+    told = looked_at(changed(ODOMETRY, in_spikes), tmp_path).timeline
+    (said,) = [one for one in told if "at its fastest" in one.text]
+    assert "0.5" in said.text.partition(" m, ")[2]
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ _OF_TITLE: tuple[tuple[re.Pattern[str], Sign], ...] = (
     (re.compile(r"an output ends before|it stands before"), "stuck"),
     (re.compile(r"heading does not follow"), "heading"),
     (re.compile(r"far above its mission"), "height"),
-    (re.compile(r"battery failsafe|not charged|battery sags"), "failsafe_battery"),
+    (re.compile(r"battery failsafe|partly charged|battery sags"), "failsafe_battery"),
     (re.compile(r"ground station"), "failsafe_gcs"),
     (re.compile(r"radio|throttle failsafe"), "failsafe_radio"),
 )

@@ -123,7 +123,7 @@ def _landings(flight: Px4Flight) -> Iterator[Event]:
             said = (
                 ("landed", "took off")
                 if _rose(flight, t)
-                else ("the land detector sees the ground again", "the land detector sees no ground")
+                else ("land detector: on the ground", "land detector: in the air")
             )
             yield Event(t, "flight", said[not landed], LANDED)
     for start, end in flight.armed:

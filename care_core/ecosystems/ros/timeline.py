@@ -279,8 +279,11 @@ def _motion(drive: Drive) -> Iterator[Event]:
             yield Event(began_s, "motion", "the robot moves for the first time", odometry.topic)
             yield Event(end_s, "motion", _driven(odometry), odometry.topic)
     for battery in drive.batteries:
-        words = f"battery {battery.voltage[0]:.1f} V at first, {battery.voltage[-1]:.1f} V at last"
-        yield Event(float(battery.t[-1]), "battery", f"{words}, {battery.voltage.min():.1f} V at least", battery.topic)
+        volts = battery.voltage
+        words = (
+            f"battery {volts[0]:.1f} V at the start, {volts[-1]:.1f} V at the end, {volts.min():.1f} V at the lowest"
+        )
+        yield Event(float(battery.t[-1]), "battery", words, battery.topic)
 
 
 def _driven(odometry: Odometry) -> str:
@@ -295,8 +298,8 @@ def _driven(odometry: Odometry) -> str:
     turned = f", turned {turned_deg:.0f} deg on the spot" if on_the_spot else ""
     # over pauses of its odometry it goes on, at speeds that nothing tells
     is_in_part = went > odometry.fastest_mps * float(np.ptp(odometry.t))
-    fastest = "" if is_in_part else f", {odometry.fastest_mps:.2f} m/s at most"
-    return f"drove {went:.1f} m in all{fastest}{turned}"
+    fastest = "" if is_in_part else f", {odometry.fastest_mps:.2f} m/s at its fastest"
+    return f"drove {went:.1f} m{fastest}{turned}"
 
 
 def _times(count: int, last_s: float) -> str:

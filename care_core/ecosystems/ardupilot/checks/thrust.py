@@ -45,7 +45,7 @@ _GROUNDED_S = LIMITS.add("full throttle on the ground", 5.0, "s", "a choice: a t
 SPIN_MOST = LIMITS.add("MOT_SPIN_MAX that keeps motors down", 0.9, "", "AP_MotorsMulticopter: 0.95 as shipped")
 _FLYING = LIMITS.add("least throttle in the air", 0.05, "", "a choice: above it motors turn")
 _LACKS_P = LIMITS.add(
-    "probability where it sinks with nearly all, or has hovered at too much", 0.7, "", "a choice: its own wash sinks it too"
+    "probability where it sinks with nearly all, or hovered at too much before", 0.7, "", "a choice: wash sinks it too"
 )
 _PROBABILITY: Mapping[SuspectKind, float] = {
     "hardware": LIMITS.add(

@@ -106,7 +106,7 @@ def _stuck(drive: Drive) -> Iterator[Finding]:
         forward, turns = shares
         yield Finding(
             kind="control",
-            title=f"the controller is stuck: it commands to {'turn to and fro' if turns > TURNING else 'stand'}",
+            title=f"the controller is stuck: {'it turns to and fro' if turns > TURNING else 'it commands no motion'}",
             onset_s=span[0],
             end_s=span[1],
             severity=drive.severity(span[0]),
