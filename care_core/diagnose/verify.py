@@ -13,7 +13,7 @@ from typing import Literal
 from care_core.configs.driven import option_value, readable, same_value
 from care_core.diagnose.judging import thresholds_in_force
 from care_core.diagnose.outside.change import outside_option
-from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
+from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status, first_named
 from care_core.diagnose.verdict import status_of, verdict_of
 from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.profile.schema import Schema
@@ -37,6 +37,7 @@ class ReportedObjective(Record):
 
 
 SAME_LOG = "this is the log that the report is about, not one of a later run"
+OTHER_VEHICLE = "this is another vehicle"
 
 NEITHER = "neither the change nor the mission is that of the report"
 OTHER_NEED = 0.1
@@ -202,9 +203,9 @@ def _another_vehicle(promise: ReportedPromise, log: LogInfo, changes: Iterable[M
     reframed = any("FRAME" in name for change in changes for name in change.option.parameters)
     frame = log.facts.get("frame", "")
     if promise.format == log.format and promise.frame and frame and promise.frame != frame and not reframed:
-        return f"this is another vehicle: its frame is {frame}, that of the report {promise.frame}"
+        return f"{OTHER_VEHICLE}: its frame is {frame}, that of the report {promise.frame}"
     is_other = log.robot is not None and promise.robot and log.robot.digest and log.robot.digest != promise.robot
-    return "this is another vehicle: it has another id than that of the report" if is_other else ""
+    return f"{OTHER_VEHICLE}: it has another id than that of the report" if is_other else ""
 
 
 def _asked_otherwise(promise: ReportedPromise, run: Run, schema: Schema) -> Iterator[str]:
@@ -331,17 +332,17 @@ def _verdict(
     unseen = [change.option.name for change in changes if change.made == "unknown"]
     severities = {finding.severity for finding in diagnosis.health.findings}
     status = status_of({check.after.status for check in checks}, severities, diagnosis.profile.fit.verdict)
-    if doubt == SAME_LOG:
+    if doubt == SAME_LOG or (status == "fault" and doubt.startswith(OTHER_VEHICLE)):
         return "cannot_tell", f"Cannot tell: {doubt}."
     if status == "fault" and unmade:
         return "change_not_made", f"{unmade[:1].upper()}{unmade[1:]}, and {_lost(checks, diagnosis)}."
     if status == "fault":
+        if other := _lost_otherwise(checks, diagnosis):
+            return "cannot_tell", f"Cannot tell: {other}."
         unsure = f"; whether {', '.join(unseen)} was changed is not in the log" if unseen else ""
         return "not_fixed", f"Not fixed: {_lost(checks, diagnosis)}{unsure}."
-    if doubt:
-        return "cannot_tell", f"Cannot tell: {doubt}."
-    if status == "not_evaluated":
-        return "cannot_tell", f"Cannot tell: {_untold(checks, diagnosis)}."
+    if doubt or status == "not_evaluated":
+        return "cannot_tell", f"Cannot tell: {doubt or _untold(checks, diagnosis)}."
     although = list(_although(unmade, unseen, others, checks))
     if although:
         return "fixed_although", f"Recovered: every objective is within its threshold, although {'; '.join(although)}."
@@ -353,6 +354,18 @@ def _lost(checks: Sequence[ObjectiveCheck], diagnosis: Diagnosis) -> str:
     broken = [check.variable.name for check in checks if check.after.status == "fault"]
     still = all(check.before.status == "fault" for check in checks if check.after.status == "fault")
     return f"{_are(broken)} {'still ' if still else ''}at fault" if broken else verdict_of(diagnosis).failed
+
+
+def _lost_otherwise(checks: Sequence[ObjectiveCheck], diagnosis: Diagnosis) -> str:
+    """What ended the run, no parameter, before anything could be judged that the report had at fault; empty where
+    something of that could be, or nothing but parameters explains the failure."""
+    faults = [check for check in checks if check.before.status == "fault"]
+    lead = first_named(diagnosis.hypotheses)
+    if not faults or any(check.outcome != "unknown" for check in faults):
+        return ""
+    if lead is None or lead.what not in ("hardware", "world") or not lead.name:
+        return ""
+    return f"{lead.name}, before {', '.join(check.variable.name for check in faults)} could be judged"
 
 
 def _untold(checks: Sequence[ObjectiveCheck], diagnosis: Diagnosis) -> str:

@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 import care_core
 from care_core.configs.driven import same_value
 from care_core.diagnose.judging import judge
-from care_core.diagnose.records import Diagnosis, Need
+from care_core.diagnose.records import Diagnosis, Hypothesis, Need
 from care_core.diagnose.verify import PromisedSet, ReportedObjective, ReportedPromise, Verification, _notes, verify
 from care_core.ecosystems.findings import Finding, Health, Severity
 from care_core.errors import ConfigError
@@ -149,6 +149,24 @@ def test_a_mission_that_failed_otherwise_is_not_fixed() -> None:
     found = checked(speed=5.0, min_sats=14)
     assert found.verdict == "not_fixed"
     assert {check.variable.name: check.outcome for check in found.objectives}["time"] == "unknown"
+
+
+def test_a_part_that_failed_before_the_fault_could_be_judged_tells_nothing_of_the_change() -> None:
+    motor = Hypothesis("hardware", "motor 2 lost thrust", 0.9, 0.9)
+    failed = replace(triaged(planted_run(speed=5.0, min_sats=14)), hypotheses=(motor,))
+    found = verify(promise(), failed, SCHEMA)
+    assert found.verdict == "cannot_tell"
+    assert found.sentence == "Cannot tell: motor 2 lost thrust, before time could be judged."
+    slow = replace(triaged(planted_run(speed=2.0)), hypotheses=(motor,))
+    assert verify(promise(), slow, SCHEMA).verdict == "change_not_made"
+
+
+def test_a_failure_of_another_vehicle_tells_nothing_of_the_change() -> None:
+    run = planted_run(speed=5.0, min_sats=14)
+    said = replace(promise(), format=run.log.format, frame="QUAD/X")
+    found = verify(said, triaged(replace(run, log=replace(run.log, facts={"frame": "HEXA/X"}))), SCHEMA)
+    assert found.verdict == "cannot_tell"
+    assert "its frame is HEXA/X" in found.sentence
 
 
 def test_what_was_not_evaluated_or_is_another_mission_cannot_be_told() -> None:
