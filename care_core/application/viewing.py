@@ -38,17 +38,14 @@ def what_would_fit(case: OpenRun) -> list[str]:
     """What would make a profile fit the log of a case that none fits: by the one of which it is told that it does not,
     or the one for this kind of log and vehicle that misses least, else a profile of its own."""
     from care_core.ecosystems.vehicles import vehicle_of
-    from care_core.extract.coverage import to_have, try_on, wrong_kind
-    from care_core.extract.fit import is_other_vehicle
+    from care_core.extract.coverage import to_have, try_on, wrong_kind, wrong_vehicle
     from care_core.extract.select import sound_profiles
 
     log = log_of(case)
     vehicle = vehicle_of(log.facts, log.settings())
     schemas = [profile.schema for profile in sound_profiles()[0]]
     tried = [
-        try_on(log, schema)
-        for schema in schemas
-        if not wrong_kind(log, schema) and not is_other_vehicle(schema, vehicle)
+        try_on(log, schema) for schema in schemas if not wrong_kind(log, schema) and not wrong_vehicle(schema, vehicle)
     ]
     told = case.diagnosis.profile.name
     nearest = max(tried, key=lambda one: (one.coverage.schema.name == told, one.coverage.found), default=None)

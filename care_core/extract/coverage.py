@@ -7,7 +7,9 @@ from collections.abc import Collection, Iterator, Sequence
 from care_core.configs.driven import readable
 from care_core.ecosystems.measures import find_extractor
 from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.vehicles import Vehicle, vehicle_of
 from care_core.errors import CareError
+from care_core.extract.parameter_aliases import with_logged_names
 from care_core.extract.read import mission_kind, read_runs, reading_plan
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
@@ -15,6 +17,8 @@ from care_core.records import Record
 from care_core.run import MissionInfo, Run, Unavailable
 from care_core.text import first_of, listed
 from care_core.variables import Role, Variable
+
+_VEHICLES = {"px4": "a PX4 vehicle", "sub": "a submarine", "heli": "a helicopter", "tracker": "an antenna tracker"}
 
 
 class Missed(Record):
@@ -84,8 +88,9 @@ def cover(log: Log, schema: Schema) -> Coverage:
 
 def try_on(log: Log, schema: Schema) -> Trial:
     """Try a profile on a log without judging anything."""
+    schema = with_logged_names(schema, log)
     coverage = cover(log, schema)
-    obstacle = wrong_kind(log, schema)
+    obstacle = wrong_kind(log, schema) or wrong_vehicle(schema, vehicle_of(log.facts, log.settings()))
     if obstacle:
         return Trial(coverage, obstacle)
     channels = _channels(log)
@@ -114,6 +119,21 @@ def wrong_kind(log: Log, schema: Schema) -> str:
     if log.format.name not in schema.logs:
         return f"it reads {' or '.join(schema.logs)}, this is {log.format.name}"
     return ""
+
+
+def a_vehicle(kind: str) -> str:
+    """A kind of vehicle in a sentence."""
+    return _VEHICLES.get(kind, f"a {kind}")
+
+
+def wrong_vehicle(schema: Schema, vehicle: Vehicle) -> str:
+    """Why a profile was made for another kind of vehicle; '' when it was not."""
+    kind = schema.match.get("vehicle", "")
+    return (
+        f"it is for {a_vehicle(kind)}, this is {a_vehicle(vehicle.kind)}"
+        if kind and vehicle.kind not in (kind, "unknown")
+        else ""
+    )
 
 
 def _no_mission(schema: Schema, channels: Collection[str]) -> str:

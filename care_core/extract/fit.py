@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.ecosystems.vehicles import UNLIKE_ROVERS, Vehicle, vehicle_of
-from care_core.extract.coverage import Coverage, wrong_kind
+from care_core.extract.coverage import Coverage, a_vehicle, wrong_kind, wrong_vehicle
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.run import FITS, NO_PROFILE_FOR, Fit, Settings
@@ -20,7 +20,6 @@ LEAST = 0.3
 """Share of the sources below which hardly anything of a run can be seen."""
 _SHIM, _BEHIND = "RotationShimController", ".primary_controller"
 """A controller that turns on the spot first and then hands over to another, which it names there."""
-_VEHICLES = {"px4": "a PX4 vehicle", "sub": "a submarine", "heli": "a helicopter", "tracker": "an antenna tracker"}
 
 
 def fit_of(log: Log, coverage: Coverage, known: Settings | None = None) -> Fit:
@@ -35,22 +34,17 @@ def fit_of(log: Log, coverage: Coverage, known: Settings | None = None) -> Fit:
     return FITS.with_objection(*_differences(log, schema, vehicle), *_lacks(coverage), *_unnamed(schema, settings))
 
 
-def is_other_vehicle(schema: Schema, vehicle: Vehicle) -> bool:
-    """Whether a profile was made for another kind of vehicle."""
-    return bool(schema.match.get("vehicle")) and vehicle.kind not in (schema.match["vehicle"], "unknown")
-
-
 def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle, settings: Settings) -> Iterator[str]:
     """Why nothing that the profile says of this log could be believed."""
     schema = coverage.schema
     other = wrong_kind(log, schema)
     if other:
         yield other
-    elif is_other_vehicle(schema, vehicle):
-        yield f"it is for {_a(schema.match['vehicle'])}, this is {_a(vehicle.kind)}"
+    elif strange := wrong_vehicle(schema, vehicle):
+        yield strange
     elif (airframe := schema.match.get("airframe")) and log.facts.get("vehicle", airframe) != airframe:
         none = f", and {NO_PROFILE_FOR}VTOLs of PX4" if log.facts["vehicle"] == "VTOL" else ""
-        yield f"it is for {_a(airframe)}, this is {_a(log.facts['vehicle'])}{none}"
+        yield f"it is for {a_vehicle(airframe)}, this is {a_vehicle(log.facts['vehicle'])}{none}"
     elif other := _other_plugin(schema, settings):
         yield other
     elif not coverage.found:
@@ -94,7 +88,7 @@ def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:
     if schema.match.get("vehicle") == "rover" and vehicle.name in UNLIKE_ROVERS:
         yield f"this is a {vehicle.name}, the profile was learned on wheels"
     if schema.match.get("vehicle") and vehicle.kind == "unknown":
-        yield f"the log does not say what vehicle it is of, the profile is for {_a(schema.match['vehicle'])}"
+        yield f"the log does not say what vehicle it is of, the profile is for {a_vehicle(schema.match['vehicle'])}"
     if schema.firmware_window is None:
         return
     low, high = schema.firmware_window
@@ -112,10 +106,6 @@ def _lacks(coverage: Coverage) -> Iterator[str]:
         yield f"{coverage.options} of its {options} parameters are in the log"
     if coverage.sources < MOST * coverage.sources_wanted:
         yield f"{coverage.sources} of its {coverage.sources_wanted} sources are in the log"
-
-
-def _a(kind: str) -> str:
-    return _VEHICLES.get(kind, f"a {kind}")
 
 
 def _dotted(version: tuple[int, ...]) -> str:

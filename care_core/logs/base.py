@@ -20,6 +20,9 @@ Wanted = Mapping[str, Sequence[str]]
 """Channel name to the fields to decode; ROS fields are dotted paths such as `pose.pose.position.x`."""
 
 
+_BURST_S = 0.1
+
+
 class Channel(Record):
     """A topic or message type: what it carries and how often (`rate_hz` over the channel's own span)."""
 
@@ -30,8 +33,8 @@ class Channel(Record):
 
     @classmethod
     def over(cls, name: str, type: str, count: int, span_s: float) -> Channel:
-        """A channel whose first and last of `count` messages are `span_s` apart."""
-        return cls(name, type, count, (count - 1) / span_s if count > 1 and span_s > 0 else None)
+        """A channel whose first and last of `count` messages are `span_s` apart; a burst has no rate."""
+        return cls(name, type, count, (count - 1) / span_s if count > 1 and span_s > _BURST_S else None)
 
 
 Kind = Literal["number", "text", "other"]
