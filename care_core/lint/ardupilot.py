@@ -122,7 +122,9 @@ def _elsewhere(file: LintedFile, entry: Entry, releases: Sequence[Release], is_t
     told = (
         _release_span(releases) if is_told else f"the releases that know most of this file ({_release_span(releases)})"
     )
-    known = _release_span([one for one in ardupilot.ALL if one in ardupilot.known_in(entry.name)])
+    known_in = [one for one in ardupilot.ALL if one in ardupilot.known_in(entry.name)]
+    own = [one for one in known_in if one.vehicle in {release.vehicle for release in releases}]
+    known = _release_span(own or known_in)
     if new:
         return file.problem("renamed", severity, entry, f"{entry.name} is {new[0]} in {told}.", new[1], _LISTS)
     text = f"{entry.name} is not in {told}, but in {known}."

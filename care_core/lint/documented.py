@@ -8,6 +8,7 @@ from difflib import get_close_matches
 
 from care_core.lint.problems import Entry, LintedFile, Problem
 from care_core.metadata.fact import Fact
+from care_core.text import listed
 
 _ALIKE = 0.84
 """Least likeness of a name to the one that is meant, of difflib: one letter off in names of seven and more."""
@@ -42,5 +43,6 @@ def unknown_bits(file: LintedFile, entry: Entry, value: float, facts: Sequence[F
     unknown = [bit for bit in range(32) if int(value) >> bit & 1 and not any(bit in one.bits for one in facts)]
     if unknown:
         source = facts[-1].source
-        text = f"{entry.name} is {value:g}: bit {', '.join(map(str, unknown))} means nothing to {source}."
+        bits = f"bit {unknown[0]} is" if len(unknown) == 1 else f"bits {listed([str(bit) for bit in unknown])} are"
+        text = f"{entry.name} is {value:g}: {bits} not defined in {source}."
         yield file.note("not-in-values", entry, text, "", source)

@@ -46,7 +46,7 @@ def told(tmp_path: Path, values: dict[str, float], version: str = "1.15.4", targ
         ({"MPC_XY_P": -0.95}, "out-of-range", "warning", "-0.95, outside 0 to 2"),
         ({"COM_ARM_BAT_MIN": -1.0}, "out-of-range", "note", "-1"),
         ({"NAV_RCL_ACT": 4.0}, "not-in-values", "warning", "They are 1, 2, 3, 5, 6"),
-        ({"EKF2_GPS_CHECK": 4095.0}, "not-in-values", "note", "bit 9, 10, 11"),
+        ({"EKF2_GPS_CHECK": 4095.0}, "not-in-values", "note", "bits 9, 10 and 11"),
         ({"MPC_POS_MODE": 4.5}, "wrong-type", "warning", "whole numbers"),
         ({"MC_ROLRATE_K": 1.0}, "unknown-key", "warning", "Did you mean MC_ROLLRATE_K?"),
         ({"MY_OWN_THING": 1.0}, "unknown-key", "note", "a custom build's"),
