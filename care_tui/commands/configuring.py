@@ -89,7 +89,7 @@ def lint(
     target: Annotated[
         str,
         typer.Option(
-            "--target", "-t", help="What they are for: noetic, humble, copter-4.6, px4-1.15; otherwise told by the files."
+            "--target", "-t", help="What they are for: noetic, humble, copter-4.6, px4-1.15; else the files tell."
         ),
     ] = "",
     profile: Annotated[str | None, profile_option("Check against this profile's acceptable values as well.")] = None,

@@ -43,22 +43,33 @@ def answer_lines(session: Session, glyphs: Glyphs, width: int, *, is_low: bool, 
         step, fraction = session.progress or ("starting", 0.0)
         head = Content.assemble("Reading ", (name, "bold"), ("  esc stops", "dim"))
         return [head, progress_bar(fraction, glyphs) + text(f"  {step}")]
-    lines = [_head(session.diagnosis, glyphs, width), *_cause_and_change(session, glyphs, width, is_low=is_low)]
+    failed = _head(session.diagnosis, glyphs, width, is_tall=is_tall)
+    lines = [*failed, *_cause_and_change(session, glyphs, width, is_low=is_low)]
     next_step = verdict_of(session.diagnosis).next_step
     is_said = session.diagnosis.fix is not None and not session.diagnosis.abstained  # the change is what to do next
     if next_step and not is_low and (is_tall or not is_said):
-        lines.append(_labelled("Next") + text(next_step))
+        lines += _over_two(_labelled("Next") + text(next_step), width, is_tall=is_tall)
     return [*lines, *_limits(session.diagnosis, width, is_tall=is_tall)]
 
 
-def _head(diagnosis: Diagnosis, glyphs: Glyphs, width: int) -> Content:
+def _head(diagnosis: Diagnosis, glyphs: Glyphs, width: int, *, is_tall: bool) -> list[Content]:
     """The fault in words; that the profile fits stands in the corner, where there is one."""
     verdict = verdict_of(diagnosis)
     told = Content.assemble(status(verdict.status, glyphs), "  ", (clean(verdict.failed), "bold"))
     if diagnosis.profile.fit.verdict != "fits":
-        return told
-    cut = _cut(told, width - len(_FITS) - 2, glyphs)
-    return cut.pad_right(width - len(_FITS) - cut.cell_length) + Content.styled(_FITS, "dim")
+        return _over_two(told, width, is_tall=is_tall)
+    first, *rest = _over_two(told, width - len(_FITS) - 2, is_tall=is_tall)
+    first = _cut(first, width - len(_FITS) - 2, glyphs)
+    return [first.pad_right(width - len(_FITS) - first.cell_length) + Content.styled(_FITS, "dim"), *rest]
+
+
+def _over_two(line: Content, width: int, *, is_tall: bool) -> list[Content]:
+    """The line; where there is room and it does not fit, what is left of it on a second one."""
+    if not is_tall or line.cell_length <= width:
+        return [line]
+    first = line.wrap(width)[0].rstrip()
+    left = line[len(first.plain) :]
+    return [first, Content(" " * _LABEL) + left[len(left.plain) - len(left.plain.lstrip()) :]]
 
 
 def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: bool) -> Iterator[Content]:
