@@ -91,6 +91,8 @@ class Past(Record):
     at: str
     log: str
     mission: int
+    robot: str
+    """Its identity; empty where nothing tells whose log it is."""
     profile: str
     fit: FitVerdict
     status: RunStatus
@@ -197,6 +199,7 @@ def _past(triaged: Triaged, before: Triaged | None, became: Mapping[str, list[st
         at=triaged.at,
         log=triaged.log_path,
         mission=triaged.mission,
+        robot=triaged.robot.id if triaged.robot else "",
         profile=document.profile.name if document.profile else "",
         fit=document.fit.verdict,
         status=verdict.status,

@@ -123,10 +123,12 @@ def in_order(told: Iterable[Triaged]) -> list[Triaged]:
 
 
 def runs_before(told: Iterable[Triaged]) -> dict[int, Triaged]:
-    """The run before, of the same robot and judged by the same profile, of each run that has one, by its `id`."""
+    """The run before, of the same robot and judged by the same profile, of each run that has one, by its `id`. What no
+    log tells the robot of may be of several."""
     groups: dict[tuple[str, str], list[Triaged]] = {}
     for run in told:
-        groups.setdefault((run.robot.id if run.robot else "", _profile(run)), []).append(run)
+        if run.robot is not None:
+            groups.setdefault((run.robot.id, _profile(run)), []).append(run)
     return {id(after): before for runs in groups.values() for before, after in pairwise(in_order(runs))}
 
 

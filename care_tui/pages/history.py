@@ -186,8 +186,11 @@ class HistoryPage(FiguredPage):
         return happened_rows(health_rows(health), pane.room.width - 1, self.glyphs)
 
     def _alike(self, past: Past) -> list[Past]:
-        """The runs that were judged by the same profile, oldest first."""
-        return [run for run in reversed(self._runs) if run.profile == past.profile]
+        """The runs of the same robot that were judged by the same profile, oldest first; of one that nothing tells the
+        robot of itself alone."""
+        if not past.robot:
+            return [past]
+        return [run for run in reversed(self._runs) if (run.robot, run.profile) == (past.robot, past.profile)]
 
     def _is_drawn(self, past: Past) -> bool:
         """Whether the objectives are drawn over the runs."""

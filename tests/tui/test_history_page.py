@@ -17,7 +17,7 @@ from care_core.errors import CareError
 from care_core.history.store import History
 from care_core.records import replace
 from care_core.report.history import history_document, history_text
-from care_core.run import Setting
+from care_core.run import Robot, Setting
 from care_tui.app import CareApp
 from care_tui.render.plot import AXIS
 from care_tui.render.rows import ASCII
@@ -33,7 +33,8 @@ ROOT = Path(__file__).parents[2]
 def run_of(number: int, mission_time: float, land_speed: float) -> Diagnosis:
     """One of several runs: another log, another time, another landing speed."""
     run = sample.RUN
-    log = replace(run.log, path=f"/flights/{number:08}.BIN", sha256=f"{number:064}", recording=f"{number}")
+    robot = Robot("vehicle 7", "vehicle 7", "the board", is_sure=True)
+    log = replace(run.log, path=f"/flights/{number:08}.BIN", sha256=f"{number:064}", recording=f"{number}", robot=robot)
     return replace(
         sample.faulty(),
         run=replace(run, log=log, config={**run.config, "LAND_SPEED": land_speed}),
@@ -104,6 +105,18 @@ async def test_past_runs_show_trends_and_two_are_compared() -> None:
         assert "was judged by" not in text(app), "they are runs of one robot"
         await settle(pilot, "k", "k", "x")
         assert title(app).startswith("3 runs"), "x on the marked run takes the mark away"
+
+
+async def test_runs_that_nothing_tells_the_robot_of_are_held_against_no_other() -> None:
+    for number in (1, 2):
+        made = run_of(number, 140.0, 50.0)
+        log = replace(made.run.log, robot=None)
+        assert remember_triage(replace(made, run=replace(made.run, log=log))) is None
+    assert [past.before for past in past_runs()] == ["", ""]
+    app = remembering_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "y", "j")
+        assert "1 run up to it" in text(app)
 
 
 async def test_a_wide_history_draws_objectives_over_the_runs_and_tells_what_was_set_anew() -> None:
