@@ -150,7 +150,8 @@ def _without_profile(diagnosis: Diagnosis) -> str:
     if diagnosis.health.too_little == NOT_FLOWN:
         return "triage a log in which the vehicle was armed; 'care inspect LOG' shows what this one holds"
     if diagnosis.health.too_little and any(not (part.is_jump or part.is_whole) for part in run.log.damage):
-        return "copy the log from the vehicle again: this file is damaged, and too little is left of it"
+        source = "ground station" if run.log.format == MAVLINK_TLOG.name else "vehicle"
+        return f"copy the log from the {source} again: this file is damaged, and too little is left of it"
     if diagnosis.health.too_little:
         return "'care inspect LOG' shows what this log holds, 'care record PROFILE' what to record"
     return "'care inspect LOG' tells what each profile would need"

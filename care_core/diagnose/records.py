@@ -31,7 +31,7 @@ class Need(Record):
     @property
     def exceeded(self) -> str:
         """How often the reference takes more than a limit that its spread sets."""
-        return "one time in fifty" if self.is_own else "one time in ten"
+        return "one run in fifty" if self.is_own else "one run in ten"
 
 
 class ObjectiveResult(Record):
@@ -91,8 +91,7 @@ class ObjectiveResult(Record):
             allowed = f"{least:g} {self.variable.unit}".rstrip()
             return f"{allowed} is always allowed; the reference configuration needs {need} for this mission"
         if self.threshold != self.variable.relative.for_need(self.need.value):
-            often = f"{self.need.exceeded} as much as this limit"
-            return f"the reference configuration needs {need} for this mission, and {often}"
+            return f"the reference configuration needs {need} for this mission; {self.need.exceeded} exceeds this limit"
         if self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"

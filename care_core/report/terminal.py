@@ -127,14 +127,14 @@ def _causes(faults: Sequence[Fault], diagnosis: Diagnosis) -> Iterator[str]:
     named = [cause for cause in fault.causes if not cause.is_lead]
     shown = [cause for cause in named if not _is_unlikely(cause, diagnosis)]
     if not named:
-        yield "  none is likely among the parameters of the profile"
+        yield "  none of the profile's parameters is likely"
     for cause in shown:
         yield from _cause(cause, diagnosis.odds_as_driven)
     if unlikely := [cause.option.name for cause in named if cause not in shown]:
         yield from wrapped(below(unlikely, after=len(shown)), "  ", "    ")
     leads = [f"{c.option.name} ({c.option.driven(c.current, c.is_assumed)})" for c in fault.causes if c.is_lead]
     if leads:
-        yield from wrapped(f"not ruled out: {', '.join(leads)}", "  ", "    ")
+        yield from wrapped(f"not ruled out, as driven: {', '.join(leads)}", "  ", "    ")
 
 
 def _is_unlikely(cause: Cause, diagnosis: Diagnosis) -> bool:

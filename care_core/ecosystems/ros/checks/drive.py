@@ -367,7 +367,8 @@ def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:
     lasting = slow & np.append(slow[1:], False) & (demands > FASTER * reached)
     since = np.flatnonzero(lasting & (np.arange(len(t)) > (faster[-1] if len(faster) else -1)))
     span = float(t[min(*since[:1], found[0][0])]), float(t[found[-1][1] - 1])
-    evidence = f"reaches {reached:.2f} m/s of {demanded:.2f} m/s commanded, for {len(rows)} samples"
+    slow_s = sum(float(t[last - 1] - t[first]) for first, last in found)
+    evidence = f"reaches {reached:.2f} m/s of {demanded:.2f} m/s commanded, for {slow_s:.0f} s"
     if odometry.fastest_mps < FASTER * reached:
         evidence += "; it was never faster in this recording, which may be its limit"
     yield _finding(drive, "the drive is weak: slower than commanded", span, evidence)
