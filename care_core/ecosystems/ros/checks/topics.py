@@ -79,6 +79,12 @@ def stalls(drive: Drive) -> bool:
     return bool(silence) or any(True for _ in _outage(drive, silence))
 
 
+_RECORD_AS_SENT = (
+    "that concerns the recording alone: give 'ros2 bag record' what the publisher has by --qos-profile-overrides-path"
+)
+_ASK_AS_SENT = "let the subscriber ask for what the publisher offers (best effort for most sensors)"
+
+
 def _qos(drive: Drive) -> Iterator[Finding]:
     counts = {channel.name: channel.count for channel in drive.channels}
     complaints: dict[str, tuple[float, str, str]] = {}
@@ -97,7 +103,7 @@ def _qos(drive: Drive) -> Iterator[Finding]:
             end_s=at,
             severity="warning" if empty else "info",
             evidence=f'{what}; {node}: "{shortened(text, 160)}"'
-            + ("; that concerns the recording alone" if is_recorders else ""),
+            + (f"; {_RECORD_AS_SENT}" if is_recorders else f"; {_ASK_AS_SENT}"),
             source="/rosout; a subscriber that asks for reliable gets nothing from a best-effort publisher (ROS 2,"
             " About QoS)",
             suspect="operation",
