@@ -381,7 +381,7 @@ def show_profile(word: str, answers: Sequence[Report]) -> None:
     print(f"  of all faults, another day      {share(first(flown, 1), n)}")
     print(f"  of what was advised, repaired   {share(first(flown, 0), len(flown))}")
     if flown:
-        promised = np.mean([answer["fix"]["p_fixed"] for answer in flown])
+        promised = np.mean([odds for answer in flown if (odds := answer["fix"]["p_fixed"]) is not None])
         changed = np.median([len(answer["fix"]["changes"]) for answer in flown])
         print(f"  promised {promised:.2f} in the mean; {changed:g} options changed in the middle")
     checked = [pair for answer in flown for pair in zip(answer["verdicts"], answer["met"], strict=True)]
