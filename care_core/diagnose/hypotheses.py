@@ -221,7 +221,7 @@ def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Seque
 class _ByTurns(NamedTuple):
     """Probability that what broke is kept, as each option off its reference goes back by turns."""
 
-    off: list[str]
+    off: Sequence[str]
     driven: float
     back: float
     """With all of them back."""
