@@ -66,7 +66,7 @@ def test_a_folder_is_each_log_in_it_unless_they_are_one_recording(care: Care, tm
     assert outcome.code == 1
     refused = care("triage", logs, "--json")
     assert (refused.code, refused.stdout) == (2, "")
-    assert "no one run" in refused.stderr
+    assert "holds several logs" in refused.stderr
     assert care("triage", logs, "--junit").stdout.count("<testsuite ") == 2
     empty = tmp_path / "empty"
     empty.mkdir()

@@ -152,8 +152,9 @@ async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_v
     app = make_app(sample.crashed())
     async with app.run_test(size=(80, 32)) as pilot:
         await settle(pilot)
-        _, _, _, next_step, fit, warnings = pinned(app)
+        *_, next_step, rest, fit, warnings = pinned(app)
         assert next_step.startswith("Next     make the change, ")
+        assert rest.startswith(" " * 9), "what does not fit on a line stands below it"
         assert fit.startswith("! Profile arducopter partly fits: ")
         assert warnings.startswith("! 142 bytes that are no message")
     app = make_app(replace(sample.all_ok(), profile=sample.fitting("fits")))
