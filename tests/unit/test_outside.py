@@ -353,7 +353,7 @@ def test_how_a_vehicle_is_built_its_operator_knows() -> None:
     found = lead("FRAME_TYPE", 19, [named("FRAME_TYPE", ("FRAME_TYPE", 0.0))])
     assert not found.is_advised  # type: ignore[attr-defined]
     unknown = lead("FRAME_CLASS", 14, [named("FRAME_CLASS")])
-    assert check_first(unknown) == "check first: FRAME_CLASS is wrong"  # type: ignore[arg-type]
+    assert check_first(unknown) == "what is found comes first: FRAME_CLASS is wrong"  # type: ignore[arg-type]
     other = replace(named("FRAME_CLASS"), title="outputs of motors are driven as servos")
     said = check_first(lead("FRAME_CLASS", 14, [other]))  # type: ignore[arg-type]
     assert said == "check first FRAME_CLASS 14: outputs of motors are driven as servos"

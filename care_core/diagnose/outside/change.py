@@ -64,19 +64,16 @@ def leading_outside(
     if finding is None and suspect is None:
         return None
     is_learned = suspect is not None and suspect.is_learned and meaning is not None and meaning.role in FROM_FLIGHTS
-    # What names several parameters gives each a share; together they are what it says.
-    named = {first.name} if finding is None else {first.name, *finding.parameters}
-    acted = sum(one.probability for one in hypotheses if one.what == "parameter" and one.name in named)
     is_carried = (measured is not None or is_learned) and not _is_kept(first.name, vehicle_of_run(run).kind)
     return Advisable(
         first.name,
         float(setting.value),
         wanted,
         in_words,
-        acted,
+        first.probability,
         finding.title if finding is not None else suspect.text if suspect is not None else "",
         is_found=finding is not None,
-        is_advised=is_carried and wanted not in (None, setting.value) and acted >= ENOUGH,
+        is_advised=is_carried and wanted not in (None, setting.value) and first.probability >= ENOUGH,
     )
 
 
@@ -165,7 +162,7 @@ def _type(name: str, fact: Fact | None) -> ValueType:
 def check_first(one: Advisable) -> str:
     """What to look at where no change is advised."""
     if one.is_found and one.why.startswith(one.name):  # it was changed on the way: no single value was driven
-        return f"check first: {one.why}"
+        return f"what is found comes first: {one.why}"
     why = f": {one.why}" if one.why and not one.why.startswith(f"{one.name} {shown(one.value)}") else ""
     usual = f" ({one.wanted_in_words})" if one.wanted_in_words else ""
     return f"check first {one.name} {shown(one.value)}{usual}{why}"
