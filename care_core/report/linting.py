@@ -112,9 +112,10 @@ def counted(linted: Sequence[Linted]) -> str:
             parts.append(f"{count} {severity.value}{'' if count == 1 else 's'}")
     files = f"{len(linted)} file{'' if len(linted) == 1 else 's'}"
     strange = [one for one in linted if 2 * one.unknown > len(one.file.entries)]
-    of_all = ", most of whose keys care does not know"
-    of_some = f"; of {len(strange)} of them care does not know most keys" if strange else ""
-    more = of_all if len(strange) == len(linted) else of_some
+    more = ""
+    if strange:
+        of_some = f"; of {len(strange)} of them care does not know most keys"
+        more = ", most of whose keys care does not know" if len(strange) == len(linted) else of_some
     return f"{', '.join(parts) or 'nothing found'} in {files}{more}"
 
 
