@@ -8,8 +8,12 @@ was used for training. Told are
 
 - hypotheses: of every option that was off, and of hardware where some failed, how likely it acted, against whether it
   is in a set that repaired the mission; the leading ones apart;
-- promises: of every option that was put back alone, and of the advised set where it was flown, the odds, against
-  whether the mission then met everything;
+- promises: of every option that was put back alone the odds, against whether the mission then met everything;
+- advised: the odds of what is advised, against whether that repaired the mission where it was flown, or else whether it
+  holds a set that did: only the smallest sets were looked for, so counting those flown alone would leave out most that
+  repair;
+- calibration errors beside those of somebody whose every probability is true, on as many: in the mean, and in the
+  worst of twenty;
 - missions until repaired: each way proposes changes, one mission each, on top of those before, until a set that
   repaired the mission is among them; the last is everything at its reference and hardware mended.
 
@@ -44,11 +48,13 @@ from care_core.errors import CareError
 from care_core.learn.skill import calibration_error, reliability
 from care_core.learn.table import read_table
 from care_core.logs.finding import logs_below
+from care_core.numbers import Floats
 from care_core.records import Record, Struct, field
 
 HARDWARE = "hardware"
 MOST_MISSIONS = 8
 """A way that has not repaired the robot by then puts everything back."""
+DRAWN = 1000
 Truth = dict[str, Any]
 Pairs = list[tuple[float, float]]
 
@@ -74,6 +80,10 @@ class Failure(Record, eq=False):
         rows = self.truth.get("tried") or ()
         pairs = ((row[0], row[2]) if isinstance(row, list) else (row["reset"], row["ok"]) for row in rows)
         return {frozenset(names): bool(ok) for names, ok in pairs}
+
+    def repaired_by(self, changes: frozenset[str]) -> bool:
+        """Whether a mission meets everything with these put back: as flown, else as it holds what repaired one."""
+        return self.tried.get(changes, any(fixing <= changes for fixing in self.fixing))
 
     @property
     def promise(self) -> Promise | None:
@@ -183,8 +193,8 @@ def _count_promises(told: Told, one: Failure) -> None:
         if len(names) == 1 and names <= one.query.config.keys():
             config = {**one.query.config, **{name: one.query.reference[name] for name in names}}
             told.promises.append((float(promise.odds([config])[0]), float(ok)))
-    if fix is not None and fix.odds is not None and one.advised in one.tried:
-        told.advised.append((fix.odds, float(one.tried[one.advised])))
+    if fix is not None and fix.odds is not None:
+        told.advised.append((fix.odds, float(one.repaired_by(one.advised))))
 
 
 def missions_until_repaired(one: Failure, proposals: Sequence[frozenset[str]]) -> int:
@@ -195,7 +205,7 @@ def missions_until_repaired(one: Failure, proposals: Sequence[frozenset[str]]) -
     done: frozenset[str] = frozenset()
     for count, changes in enumerate(proposals[:MOST_MISSIONS], start=1):
         done |= changes
-        if one.tried.get(done, any(fixing <= done for fixing in one.fixing)):
+        if one.repaired_by(done):
             return count
     return min(len(proposals), MOST_MISSIONS) + 1
 
@@ -255,10 +265,18 @@ def scores(pairs: Pairs) -> str:
     met = np.round(true)
     brier = float(np.mean((said - met) ** 2))
     loss = float(-np.mean(np.log(np.where(met == 1.0, said, 1.0 - said))))
+    by_luck = errors_by_luck(said)
     return (
         f"{len(pairs):4d}: said {said.mean():.3f}, true {met.mean():.3f}, calibration error "
-        f"{calibration_error(said, met):.3f}, Brier {brier:.4f}, log loss {loss:.3f}"
+        f"{calibration_error(said, met):.3f} (by luck {by_luck.mean():.3f} to {np.quantile(by_luck, 0.95):.3f}), "
+        f"Brier {brier:.4f}, log loss {loss:.3f}"
     )
+
+
+def errors_by_luck(said: Floats) -> Floats:
+    """Calibration errors of `DRAWN` worlds in which these probabilities are true: few pairs show none that is small."""
+    rng = np.random.default_rng(0)
+    return np.array([calibration_error(said, (rng.random(len(said)) < said).astype(float)) for _ in range(DRAWN)])
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from care_core.ecosystems.vehicles.settings import code
-from care_core.ecosystems.vehicles.vehicle import vehicle_of
+from care_core.ecosystems.vehicles.vehicle import is_simulated, vehicle_of
 from care_core.logs.base import Log
 from care_core.records import replace
 from care_core.run import Robot, Setting
@@ -40,7 +40,7 @@ def robots(log: Log) -> Iterator[Robot]:
     for name, table in log.read(_SAID).items():
         columns = (table.columns.get(field, ()) for field in _SAID[name])
         boards = (robot for column in columns for value in column if (robot := _board(value)) is not None)
-        yield from map(_simulated, boards) if _is_simulated(settings) else boards
+        yield from map(_simulated, boards) if _has_simulated_sensors(settings) else boards
     for name in _SERIALS:
         if (serial := code(settings, name) or 0) > 0:
             yield Robot(f"serial {serial}", f"serial {serial}", name, is_sure=True)
@@ -48,14 +48,16 @@ def robots(log: Log) -> Iterator[Robot]:
     system = facts.get("system", "").partition(".")[0]
     number = next(told, int(system) if system.isdecimal() else 0)
     if number > _DELIVERED:
-        yield Robot(f"system {number}", f"system {number}", "system id", is_sure=True)
+        # PX4's simulator counts its instances up: the next vehicle of this machine has the same number
+        counted = facts.get("stack") == "PX4" and is_simulated(facts, settings)
+        yield Robot(f"system {number}", f"system {number}", "system id", is_sure=True, is_simulated=counted)
     if number:
         kind = vehicle_of(facts, settings).kind
         name = f"{'vehicle' if kind == 'unknown' else kind} {number}"
         yield Robot(name, name, "system id as delivered", is_sure=False)
 
 
-def _is_simulated(settings: Mapping[str, tuple[Setting, ...]]) -> bool:
+def _has_simulated_sensors(settings: Mapping[str, tuple[Setting, ...]]) -> bool:
     """Whether the sensors are a simulator's."""
     ids = (code(settings, name) for name in _SENSORS)
     return any(id & _BUS == _SIMULATED_BUS for id in ids if id)

@@ -314,18 +314,22 @@ def _value(value: float | str) -> str:
 
 
 def _profile_lines(profiles: Iterable[ProfileEntry], width: int) -> Iterator[str]:
+    others = []
     for profile in profiles:
-        held = ""
-        if profile.sources_wanted:
-            held = (
-                f"{profile.options} of {profile.options_wanted} parameters and {profile.sources} of"
-                f" {profile.sources_wanted} sources are in the log"
-            )
-        verdict = held if profile.usable else "; ".join(part for part in (f"no: {profile.reason}", held) if part)
+        if not profile.usable and not profile.sources_wanted:
+            others.append(profile.name)
+            continue
+        held = (
+            f"{profile.options} of {profile.options_wanted} parameters and {profile.sources} of"
+            f" {profile.sources_wanted} sources are in the log"
+        )
+        verdict = held if profile.usable else f"no: {profile.reason}; {held}"
         yield from wrapped(f"{profile.name}: {verdict}", "Profile     ", width=width)
         yield from (f"  mission {mission.index} {_mission_text(mission)}" for mission in profile.missions)
         if profile.options or profile.sources:
             yield from _missed_lines(profile.missed, width)
+    if others:
+        yield from wrapped(f"for other logs (see --json): {', '.join(others)}", "Profile     ", width=width)
 
 
 def _mission_text(mission: MissionEntry) -> str:

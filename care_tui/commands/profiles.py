@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from care_core.errors import ExitCode, UsageError
+from care_core.text import wrapped
 from care_tui.completing import profile_names
 from care_tui.console import Progress, emit, say
 
@@ -47,8 +49,10 @@ def listed_profiles() -> str:
         say("No profile is installed.")
     for problem in problems:
         say(f"care: {problem}")
-    widths = [max((len(row[column]) for row in rows), default=0) for column in range(2)]
-    return "".join(f"{name:<{widths[0]}}  {version:<{widths[1]}}  {platform}\n" for name, version, platform in rows)
+    table = [("profile", "version", "platform"), *rows] if rows else []
+    widths = [max((len(row[column]) for row in table), default=0) for column in range(2)]
+    lines = [wrapped(what, first=f"{name:<{widths[0]}}  {version:<{widths[1]}}  ") for name, version, what in table]
+    return "".join(f"{line}\n" for line in chain(*lines))
 
 
 @app.command("show")

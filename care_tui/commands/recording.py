@@ -21,7 +21,9 @@ def record(
     name: Annotated[
         str,
         typer.Argument(
-            metavar="PROFILE", help="A profile, or px4, ardupilot or ros for any robot.", autocompletion=profile_names
+            metavar="PROFILE",
+            help="One of 'care profiles', or px4, ardupilot or ros for any robot.",
+            autocompletion=profile_names,
         ),
     ],
     run: Annotated[

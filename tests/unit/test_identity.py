@@ -48,6 +48,14 @@ def test_the_best_name_a_log_gives(log: MadeLog, robot: str | None) -> None:
     assert sure_id(log) == robot
 
 
+def test_a_number_that_a_simulator_counted_up_tells_no_vehicle() -> None:
+    flown = {hardware: identify(saying(MAV_SYS_ID=3, facts={"stack": "PX4", "hardware": hardware})) for hardware in
+             ("PX4_SITL", "PX4_FMU_V6X")}  # fmt: skip
+    assert {hardware: robot is not None and robot.is_simulated for hardware, robot in flown.items()} == {
+        "PX4_SITL": True, "PX4_FMU_V6X": False,
+    }  # fmt: skip
+
+
 def test_a_name_cannot_steer_a_terminal() -> None:
     assert sure_id(saying(facts={"robot": "\x1b[31mred"})) == "\\x1b[31mred"
 

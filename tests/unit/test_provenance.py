@@ -103,6 +103,8 @@ def test_what_a_vehicle_writes_itself_is_left_out_of_changes() -> None:
         "BARO1_GND_PRESS",
         "MOT_THST_HOVER",
         "BARO1_DEVID",
+        "EKF2_MAG_DECL",
+        "ASPD_SCALE_1",
     ):
         assert is_self_written(name)
     for name in ("LAND_SPEED", "INS_GYRO_FILTER", "COMPASS_USE", "RC1_OPTION", "BATT_LOW_VOLT", "/move_base/x"):

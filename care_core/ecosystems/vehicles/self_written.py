@@ -20,7 +20,8 @@ SELF_WRITTEN: dict[str, tuple[str, ...]] = {
     ),
     "learned in flight": (
         "MOT_THST_HOVER", "H_COL_HOVER", "TUNE_*_LAST", "COMPASS_OFS*", "COMPASS_DEC", "AHRS_TRIM_[XYZ]",
-        "Q_M_THST_HOVER", "Q_TRIM_PITCH_LAST",
+        "Q_M_THST_HOVER", "Q_TRIM_PITCH_LAST", "EKF2_MAG_DECL", "ATT_MAG_DECL", "EKF2_MAGBIAS_*",
+        "ASPD_SCALE_[0-9]",
     ),
     "calibration": (
         "COMPASS_DIA*", "COMPASS_ODI*", "COMPASS_MOT*", "COMPASS_SCALE*", "INS_*OFF*_[XYZ]", "INS_*OFFS_*",
