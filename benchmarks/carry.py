@@ -57,7 +57,7 @@ class Carried(Struct, eq=False):
     error: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     """Logarithm of measured over predicted."""
     inside: dict[str, list[bool]] = field(default_factory=lambda: defaultdict(list))
-    """Of the 80 % interval."""
+    """Of the 80% interval."""
     healthy: int = 0
     alarms: int = 0
     broken: int = 0
@@ -239,7 +239,7 @@ def main() -> None:
     varied = args.shared / "data" / "varied"
     frame = with_vehicles(read_table(args.table, schema), pd.read_parquet(args.table)["log"], varied / "settings.jsonl")
     print("kind         runs false alarms   missed      time       energy         all met      resets")
-    print("                                        rms, in 80 %  rms, in 80 %  ECE, Brier   n, ECE, Brier")
+    print("                                        rms, in 80%  rms, in 80%  ECE, Brier   n, ECE, Brier")
     parts = []
     with threadpool_limits(1):
         for kind in args.kinds:

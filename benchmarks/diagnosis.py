@@ -362,7 +362,7 @@ def brier(p: Floats, met: Floats) -> float:
 
 
 def _with_interval(measure: Callable[[Floats, Floats], float], p: Floats, met: Floats, groups: NDArray[np.str_]) -> str:
-    """The measure with its 90 % interval over resampled groups (faults are drawn whole)."""
+    """The measure with its 90% interval over resampled groups (faults are drawn whole)."""
     rng = np.random.default_rng(0)
     members = [np.flatnonzero(groups == group) for group in np.unique(groups)]
     drawn = []

@@ -326,7 +326,7 @@ def true_causes(fault: Report) -> set[str]:
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:
-    """The interval of a share, 95 %."""
+    """The interval of a share, 95%."""
     if not count:
         return 0.0, 1.0
     share, z2 = hits / count, Z95**2 / count

@@ -77,7 +77,7 @@ def read(logs: Path, table: Path) -> Iterator[Flown]:
 
 
 def by_hardware(flights: list[Flown]) -> Iterator[str]:
-    yield f"{'hardware':12s} {'began':>5s} {'found':>5s} {'first':>5s} {'three':>5s}  onset error s (median, 90 %)"
+    yield f"{'hardware':12s} {'began':>5s} {'found':>5s} {'first':>5s} {'three':>5s}  onset error s (median, 90%)"
     for kind in sorted({one.hardware for one in flights if one.hardware}):
         own = [one for one in flights if one.hardware == kind and one.began_s is not None]
         found = first = three = 0

@@ -5,9 +5,9 @@
 A simulated robot whose reference is tuned: of its 24 options each of 14 that act does harm both ways, some much, most
 little. Campaigns of the same size leave the reference in about as many options in every run (`alike`), or in few in
 some runs and in many in others, as `care collect` plans them. Asked are the reference itself and 1000 configurations
-as they are met, with 15 % of the options off: the mean odds told and the true share, Brier score and log loss; of the
+as they are met, with 15% of the options off: the mean odds told and the true share, Brier score and log loss; of the
 mission time how far missions are from what was predicted (the mean of the logarithm is the bias), and how many lie in
-the 80 % interval.
+the 80% interval.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ OFF = 0.15
 LIMIT_S = 125.0
 ASKED = 1000
 WAYS = ("alike", "as planned")
-COLUMNS = ("reference", "true", "field", "true", "Brier", "log loss", "time: bias", "rms", "in 80 %")
+COLUMNS = ("reference", "true", "field", "true", "Brier", "log loss", "time: bias", "rms", "in 80%")
 
 SCHEMA = Schema(
     name="tuned", version="1", platform="Tuned robot", doc="", match={}, logs=(), mission={}, evidence=(),

@@ -89,7 +89,7 @@ class LeftOut(NamedTuple):
     error: dict[str, Floats]
     """Logarithm of measured over predicted."""
     inside: dict[str, Floats]
-    """1 where the measured value lies in the 80 % interval, NaN where there is none."""
+    """1 where the measured value lies in the 80% interval, NaN where there is none."""
     need_error: dict[str, Floats]
     """Logarithm of what the reference flight took over what was said that it needs."""
     need_inside: dict[str, Floats]
@@ -212,7 +212,7 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
     truth = all_met(frame, schema)
     print(f"missions left out whole: {len(frame)} runs")
     print(
-        "  runs at a distance of    time: rms  in 80 %   energy: rms  in 80 %   all met: ECE   Brier  "
+        "  runs at a distance of    time: rms  in 80%   energy: rms  in 80%   all met: ECE   Brier  "
         "promised: ECE  Brier  plain: ECE  Brier"
     )
     bounds = (0.0, *FAR, np.inf)
@@ -234,7 +234,7 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
         known = np.isfinite(found.need_error[name])
         error = found.need_error[name][known]
         print(f"  what the reference needs, {name}: rms {np.sqrt(np.mean(error**2)):.1%}, "
-              f"in its 80 % interval {found.need_inside[name][known].mean():.0%}, n {known.sum()}")  # fmt: skip
+              f"in its 80% interval {found.need_inside[name][known].mean():.0%}, n {known.sum()}")  # fmt: skip
     for name, predicted in (("predicted", found.predicted), ("promised", found.promised)):
         print(f"    {name:9}  met    n")
         for p, seen, count in reliability(predicted, truth):
@@ -254,7 +254,7 @@ def show_unseen(profile: Profile, frame: pd.DataFrame) -> None:
           f"by the share alone {truth.mean() * (1 - truth.mean()):.3f}")  # fmt: skip
     for name in measured(schema):
         known = np.isfinite(found.error[name])
-        print(f"  {name}: rms {np.sqrt(np.mean(found.error[name][known] ** 2)):.1%}, in its 80 % interval "
+        print(f"  {name}: rms {np.sqrt(np.mean(found.error[name][known] ** 2)):.1%}, in its 80% interval "
               f"{found.inside[name][known].mean():.0%}, n {known.sum()}")  # fmt: skip
     for share, seen, count in reliability(said, truth):
         print(f"    {share:4.2f} {seen:4.2f} {count:4d}")

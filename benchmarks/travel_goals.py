@@ -4,7 +4,7 @@
 
 The training drives of the `move_base` profile all had the same five goals. Each is cut into two missions; time and
 energy of the second are predicted by mechanisms of the first, learned on other runs: error (rms and mean of the
-logarithm) and share in the 80 % interval, with the noise of as many goals as the mission has and with that of training;
+logarithm) and share in the 80% interval, with the noise of as many goals as the mission has and with that of training;
 beside it the same for missions of the first kind.
 """
 
@@ -77,7 +77,7 @@ def _values(mission: Mission, schema: Schema) -> dict[str, float]:
 def predicted(
     mechanism: Mechanism, name: str, schema: Schema, rows: pd.DataFrame
 ) -> tuple[np.ndarray[tuple[int], np.dtype[np.float64]], np.ndarray[tuple[int], np.dtype[np.bool_]]]:
-    """Logarithm of measured over predicted, and whether the 80 % interval holds the measured; shape (n,) each."""
+    """Logarithm of measured over predicted, and whether the 80% interval holds the measured; shape (n,) each."""
     training = Training(origin="", runs=0, seed=0, alpha=0.01, resamples=0)
     model = Model(
         schema_digest="", graph=CausalGraph((), frozenset(), frozenset()), edges={}, bidirected=(), effects={},
@@ -127,7 +127,7 @@ def main() -> None:
             error = np.concatenate(errors)
             print(
                 f"  {name:12s} learned on {learned}, asked of {part}: rms {np.sqrt(np.mean(error**2)):.1%}, "
-                f"mean {error.mean():+.1%}, in the 80 % interval {np.concatenate(inside).mean():.0%} "
+                f"mean {error.mean():+.1%}, in the 80% interval {np.concatenate(inside).mean():.0%} "
                 f"(without the noise of each goal {np.concatenate(as_training).mean():.0%}), n {len(error)}"
             )
 

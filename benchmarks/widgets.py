@@ -39,7 +39,7 @@ def line(index: int) -> Content:
     odds = index % 10
     return Content.assemble(
         "[ ] ", (f"GROUP{index % 40:02}_OPTION_{index}".ljust(28), "bold"), f"{index * 1.5:g} m/s".ljust(20),
-        ("█" * odds, "$text-success"), ("░" * (10 - odds), "dim"), f" {10 * odds:>3} %",
+        ("█" * odds, "$text-success"), ("░" * (10 - odds), "dim"), f" {10 * odds:>3}%",
     )  # fmt: skip
 
 

@@ -92,7 +92,7 @@ def figures(value: float, digits: int = 3) -> str:
 
 
 _INSIDE_FIGURE = re.compile(
-    r"(?<=\d) (?=(?:[mu]?s|[ckm]?m|m/s\S*|[mk]?V|m?Ah?|Wh?|k?Hz|kg|deg\S*|rad\S*|%)(?![\w/]))"
+    r"(?<=\d) (?=(?:[mu]?s|[ckm]?m|m/s\S*|[mk]?V|m?Ah?|Wh?|k?Hz|kg|deg\S*|rad\S*)(?![\w/]))"
     r"|(?<=\d s) (?=\(\d+:\d)"
 )
 """The space between a number and its unit, and before its minutes: no line ends there."""

@@ -70,7 +70,7 @@ _LOST = Finding("attitude", "control was lost", 61.5, 70.0, "critical", "80 degr
 HEALTH = Health(
     "ArduCopter V4.5.4, quad X",
     (Event(1.0, "arming", "armed", "ARM"), Event(3.0, "message", HOSTILE, "MSG")),
-    (Finding("motor", f"motor 2 {HOSTILE}", 61.0, 70.0, "critical", f"93 % {HOSTILE}", "RCOU", consequences=(_LOST,)),),
+    (Finding("motor", f"motor 2 {HOSTILE}", 61.0, 70.0, "critical", f"93% {HOSTILE}", "RCOU", consequences=(_LOST,)),),
 )
 
 

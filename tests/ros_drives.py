@@ -17,6 +17,7 @@ FAILS_AT_S, ENDS_S = 16.0, 40.0
 STEP_S = 0.04
 RAYS = 181
 WIDE_M, LONG_M = 1.5, 40.0
+CRAWL_MPS = 0.1
 ODOMETRY, TWIST, SCAN = "nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist", "sensor_msgs/msg/LaserScan"
 BATTERY, STATUS, LOG = "sensor_msgs/msg/BatteryState", "action_msgs/msg/GoalStatusArray", "rcl_interfaces/msg/Log"
 SUCCEEDED, ABORTED = 4, 6
@@ -29,6 +30,10 @@ class Drive(Struct, eq=False):
     outcome: int = SUCCEEDED
     said: list[tuple[float, int, str, str]] = field(default_factory=list)
     """Time, level, node and text of messages."""
+    waits_s: float = 0.0
+    """It stands, without a command, until then."""
+    crawls: bool = False
+    """It is told to crawl from `FAILS_AT_S` on."""
     x: float = 0.0
     y: float = 0.0
     yaw: float = 0.0
@@ -50,7 +55,8 @@ class Drive(Struct, eq=False):
         for tick in range(round(ENDS_S / STEP_S)):
             t = tick * STEP_S
             failing = t >= FAILS_AT_S
-            wanted = 0.5, 0.2 * np.cos(t)
+            wanted = (CRAWL_MPS, 0.0) if failing and self.crawls else (0.5, 0.2 * np.cos(t))
+            wanted = (0.0, 0.0) if t < self.waits_s else wanted
             speed, turn = self._driven(t, *wanted) if failing else wanted
             self._move(speed, turn, onset=abs(t - FAILS_AT_S) < STEP_S / 2, failing=failing)
             if tick % 5 == 0:
@@ -66,7 +72,7 @@ class Drive(Struct, eq=False):
                 yield "/front/scan", SCAN, t, _scan(t, ranges)
             if tick % 25 == 0:
                 low = 4.0 if failing and self.fault == "battery" else 0.0
-                pushes = self.fault == "blocked" and failing
+                pushes = self.fault in ("blocked", "held") and failing
                 amps = 2.0 + (4.0 * abs(wanted[0] if pushes else speed))
                 yield "/power", BATTERY, t, _battery(25.0 - 0.001 * t - 0.05 * amps - low, -amps)
 
@@ -79,6 +85,7 @@ class Drive(Struct, eq=False):
             "loss": (0.0, 0.0) if t % 2 < 1.4 else (speed, turn),
             "blocked": (0.0, 0.0),
             "blocked, turning": (0.0, 0.3),
+            "held": (0.0, 0.0),
             "pulls hard, stands": (0.8 * speed, turn + 0.6 * speed) if t < FAILS_AT_S + 3.2 else (0.0, 0.0),
         }
         return ways.get(self.fault, (speed, turn))

@@ -33,7 +33,7 @@ _OF_SENSORS = ("VIBE", "VIBRATION", "XKF", "NKF", "MAG", "RCOU", "SERVO_OUTPUT_R
 """Begin channels of how sensors and motors did it, not of what the vehicle did: noise parts them first."""
 _STEP_S = 0.2
 _APART = 1 / 3
-"""Signals go apart where they differ by this share of what the signals of their channel range over (5 to 95 %), ..."""
+"""Signals go apart where they differ by this share of what the signals of their channel range over (5 to 95%), ..."""
 _FOR_S = 2.0
 """... for so long, each averaged over as long, after they were together."""
 _LEAST_APART = {"deg": 2.0, "deg/s": 3.0, "m": 0.2, "m/s": 0.1, "m/s2": 0.2, "rad": 0.03, "rad/s": 0.05}

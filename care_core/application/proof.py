@@ -44,6 +44,7 @@ _SHOWN_BY: Mapping[FindingKind, str] = {
     "drive": "speed",
     "blocked": "speed",
     "planner": "speed",
+    "clearance": "speed",
     "control": "speed",
     "commands": "height speed",
 }

@@ -42,7 +42,7 @@ Conditions = Literal["same", "another day"]
 
 
 class Predicted(Record, eq=False):
-    """An objective under m configurations: expected value, 80 % interval, probability of being met; shape (m,)."""
+    """An objective under m configurations: expected value, 80% interval, probability of being met; shape (m,)."""
 
     value: Floats
     low: Floats
@@ -78,7 +78,7 @@ class CounterfactualQuery(Record, eq=False, dict=True):
     assumed: frozenset[str] = frozenset()
     """Options that no source of the run holds: taken to be at their reference."""
     wary_from: Config | None = None
-    """Where set, each mechanism counts as bad as it may be (90 %) at other configurations, given what it does at this
+    """Where set, each mechanism counts as bad as it may be (90%) at other configurations, given what it does at this
     one: what training did not show between the two is not taken for granted."""
     posteriors: PosteriorCache = field(default_factory=PosteriorCache)
     """What mechanisms predict whatever this run did: queries made of this one need most of it again."""

@@ -84,7 +84,7 @@ class PathRecord(Record, kw_only=True):
 
 
 class Summary(Record, kw_only=True):
-    """What the training runs held of one variable: `quantiles` at 0, 5, ... 100 %; `sd` is "spread" in the file."""
+    """What the training runs held of one variable: `quantiles` at 0, 5, ... 100%; `sd` is "spread" in the file."""
 
     count: int
     mean: float

@@ -1,4 +1,4 @@
-"""Good runs -> limits for their kind: what 95 % of such runs keep, with how little a few of them can tell.
+"""Good runs -> limits for their kind: what 95% of such runs keep, with how little a few of them can tell.
 
 An objective whose limit the profile counts in what the reference configuration needs is given a ratio, which holds for
 any mission. One with a fixed limit is given a value, which belongs to the mission that all the runs flew.
@@ -23,7 +23,7 @@ from care_core.run import ProfileChoice, is_known
 from care_core.variables import Op, Threshold, Variable
 
 _OF_80_PERCENT = 2 * 1.2816
-"""Standard deviations between the ends of an 80 % interval of a normal distribution."""
+"""Standard deviations between the ends of an 80% interval of a normal distribution."""
 _DIGITS = 3
 
 
@@ -37,7 +37,7 @@ class Proposal(Record):
     limit: float | None
     low: float | None = None
     high: float | None = None
-    """Where the 95 % quantile lies, with 90 %; the limit is the end on the bad side, rounded towards it."""
+    """Where the 95% quantile lies, with 90%; the limit is the end on the bad side, rounded towards it."""
     method: str = ""
     reason: str = ""
     """Why no limit is proposed."""
@@ -181,7 +181,7 @@ def _spread(objective: Variable, runs: Sequence[Judged], profile: Profile, *, re
 
 
 def _quantile(objective: Variable, values: Sequence[float], spread: float | None) -> Quantile | None:
-    """The 95 % quantile on the bad side. Values above 0 differ by factors, so their logarithms are looked at."""
+    """The 95% quantile on the bad side. Values above 0 differ by factors, so their logarithms are looked at."""
     bound = objective.threshold
     sign = 1.0 if bound is None or bound.op in ("<=", "<") else -1.0
     logs = min(values) > 0

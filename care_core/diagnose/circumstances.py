@@ -153,7 +153,7 @@ def _range_seen(variable: Variable, summary: Summary) -> tuple[float, float]:
 
 
 def _span(summary: Summary) -> tuple[float, float]:
-    """Where 95 % of the training runs lie."""
+    """Where 95% of the training runs lie."""
     return summary.quantile(RARE), summary.quantile(1 - RARE)
 
 

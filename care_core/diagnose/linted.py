@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from care_core.configs.driven import as_number, same_value
@@ -27,6 +27,7 @@ from care_core.text import clean
 
 WEIGHTS: Mapping[str, tuple[float, float]] = {
     "cannot-work": (0.9, 0.95),
+    "clearance": (0.8, 0.85),
     "contradiction": (0.8, 0.85),
     "hinders": (0.6, 0.6),
     "wrong-unit": (0.5, 0.6),
@@ -39,14 +40,14 @@ WEIGHTS: Mapping[str, tuple[float, float]] = {
 }
 """By rule, how likely the value is what was wrong, and how likely a mission fails with it: choices, by whether the
 sources leave it a way to work."""
-SURE = frozenset({"cannot-work", "contradiction"})
+SURE = frozenset({"cannot-work", "clearance", "contradiction"})
 """Rules that count for options of the profile as well, of which training knows more than the others."""
 ALSO_DEFAULTS = frozenset({"cannot-work", "hinders"})
 """Rules that no default keeps: what a node has without being told does not fit every robot."""
 _NEAR, _FAR = 0.5, 2.0
 """A value is near its default that is off it by less than half of what another is, on logarithms; from 7 times all are
 far."""
-_OF_FILES = WEIGHTS.keys() - {"cannot-work", "contradiction", "hinders"}
+_OF_FILES = WEIGHTS.keys() - {*SURE, "hinders"}
 """Rules about how a file is written; the others are asked of the values as driven."""
 _NO_NODE = frozenset({"ros", "costmap", *COSTMAPS})
 
@@ -81,7 +82,18 @@ def with_lint(
     found.sort(key=lambda one: -one.probability)
     told = [one for one in shown if one.severity != "info"]
     less = [one for one in shown if one.severity == "info"]
-    return replace(health, findings=(*told, *_each_once(found, seen), *less))
+    return replace(health, findings=(*_driven_into(told, list(_each_once(found, seen))), *less))
+
+
+def _driven_into(told: Sequence[Finding], found: Sequence[Finding]) -> Iterator[Finding]:
+    """What happened, and then what is wrong with the parameters: where plans may touch obstacles, what the robot was
+    caught on is what that led to."""
+    root = next((one for one in found if one.kind == "clearance"), None)
+    held = [one for one in told if root is not None and one.kind == "blocked" and one.onset_s >= root.onset_s]
+    if root is not None and held:
+        yield replace(root, severity=held[0].severity, consequences=tuple(every_finding(held)))
+    yield from (one for one in told if one not in held)
+    yield from (one for one in found if one is not root or not held)
 
 
 def _renamed(finding: Finding, names: Mapping[str, str]) -> Finding:
@@ -190,7 +202,7 @@ def _finding(drive: Drive, problem: Problem, suspects: list[Setting], names: Map
     probability, lost = WEIGHTS[rule]
     values = "; ".join(f"{one.name} = {one.value} ({one.source})" for one in suspects)
     return Finding(
-        kind="control",
+        kind="clearance" if rule == "clearance" else "control",
         title=clean(problem.text.removesuffix(".")),
         onset_s=drive.missed_s,
         end_s=drive.duration_s,

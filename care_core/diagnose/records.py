@@ -19,7 +19,7 @@ Confidence = Literal["high", "medium", "low"]
 
 
 class Need(Record):
-    """What the reference configuration would need for this very mission, vehicle and conditions, with its 80 %
+    """What the reference configuration would need for this very mission, vehicle and conditions, with its 80%
     interval."""
 
     value: float
@@ -132,7 +132,7 @@ class MissionVerdict(Record):
 
 
 class Prediction(Record):
-    """A predicted value of an objective with its 80 % interval, and the probability that it keeps its threshold."""
+    """A predicted value of an objective with its 80% interval, and the probability that it keeps its threshold."""
 
     value: float
     low: float
@@ -255,7 +255,7 @@ class Circumstance(Record):
     unit: str
     low: float | None
     high: float | None
-    """Where 95 % of the training runs lie."""
+    """Where 95% of the training runs lie."""
     share: float
     """Share of the training runs that lie farther out (a metric: than its configuration explains)."""
     text: str

@@ -1,7 +1,7 @@
-"""One-sided tolerance limits: what 95 % of all runs stay below, as far as a few of them can tell.
+"""One-sided tolerance limits: what 95% of all runs stay below, as far as a few of them can tell.
 
 A limit has a content (the share of runs that keep it) and a confidence (how often the method is right about that). The
-interval is that of the 95 % quantile itself, and its far end the limit: the 95/95 limit that acceptance tests use.
+interval is that of the 95% quantile itself, and its far end the limit: the 95/95 limit that acceptance tests use.
 Sources: Hahn and Meeker, Statistical Intervals (1991), sections 4.6 (normal, by the noncentral t distribution) and 5.3
 (distribution-free, by order statistics; Wilks 1941); NIST/SEMATECH e-Handbook, section 7.2.6.3.
 """
@@ -26,7 +26,7 @@ _STEPS, _HALVINGS = 400, 60
 
 
 class Quantile(Record):
-    """The 95 % quantile of all runs: an interval that holds it with 90 %, whose upper end is the tolerance limit."""
+    """The 95% quantile of all runs: an interval that holds it with 90%, whose upper end is the tolerance limit."""
 
     low: float
     high: float
@@ -34,7 +34,7 @@ class Quantile(Record):
 
 
 def upper_quantile(values: Sequence[float], known_spread: float | None = None) -> Quantile | None:
-    """What 95 % of all runs like these stay below; None where so few do not tell and no spread is known.
+    """What 95% of all runs like these stay below; None where so few do not tell and no spread is known.
 
     Args:
         values: one a run, on a scale where runs differ about as a normal distribution.
@@ -59,7 +59,7 @@ def upper_quantile(values: Sequence[float], known_spread: float | None = None) -
 
 @cache
 def factor(count: int, degrees: int | None, confidence: float) -> float:
-    """k, so that mean + k spread lies above the 95 % quantile with this probability.
+    """k, so that mean + k spread lies above the 95% quantile with this probability.
 
     Args:
         count: runs of the mean. degrees: of freedom of the spread, None where it is known exactly.

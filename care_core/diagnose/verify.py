@@ -59,7 +59,7 @@ class PromisedSet(Record):
     p_fixed: float | None
     """None where the odds were not measured: that promises nothing."""
     intervals: Mapping[str, tuple[float, float]]
-    """Per objective the 80 % interval."""
+    """Per objective the 80% interval."""
 
 
 class ReportedPromise(Record):
@@ -103,7 +103,7 @@ class OtherChange(Record):
 
 
 class ObjectiveCheck(Record):
-    """One objective before and after. `inside`: whether the outcome lies in the promised 80 % interval, which is scaled
+    """One objective before and after. `inside`: whether the outcome lies in the promised 80% interval, which is scaled
     to the mission of the run after."""
 
     variable: Variable

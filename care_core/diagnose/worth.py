@@ -225,4 +225,4 @@ def _reached(fix: Fix, result: ObjectiveResult) -> str:
         return ""
     likely = predicted.high if result.threshold.op in ("<=", "<") else predicted.low
     value, limit = (f"{number:.4g} {unit}".rstrip() for number in (likely, result.threshold.value))
-    return f"{name} is 90 % sure to reach {value}, the limit of {limit} is out of reach"
+    return f"{name} is 90% sure to reach {value}, the limit of {limit} is out of reach"

@@ -49,6 +49,7 @@ EXPLAINS: Explains = {
     "topics": frozenset(("tf", "planner", "control")),  # no topic ends another: a node ends several
     "planner": frozenset(("planner", "control", "tf")),  # one that finds no path keeps the computer busy
     "control": frozenset(("control",)),
+    "clearance": frozenset(("blocked", "drive", "planner", "control", "crash")),  # it drives into things
     "software": frozenset(("software", "topics")),
     # --- both
     "battery": frozenset(

@@ -34,6 +34,7 @@ FindingKind = Literal[
     "localisation",
     "drive",
     "blocked",
+    "clearance",
     "planner",
     "control",
     "tf",

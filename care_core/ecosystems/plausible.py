@@ -28,7 +28,7 @@ _SET_S = 5.0
 """A step of a clock by less costs no mission its time; most recorders stall for less."""
 APART, _STAMPED_S, _QUARTERS, _MOSTLY = 1.25, 10.0, 4, 0.9
 """By what factor stamps that a robot makes may run from the recording's clock, over so many seconds. A real clock is
-right to 0.01 %; one that was set is off in one quarter of the time, one that runs wrong in each."""
+right to 0.01%; one that was set is off in one quarter of the time, one that runs wrong in each."""
 _SIMULATED_S = 1e9
 """A simulation's time begins at 0: stamps so far behind the recording's have a pace of their own."""
 _PLACE, _AT_ZERO_DEG, _ELSEWHERE_DEG = ("Lat", "Lng"), 1e-6, 0.1

@@ -36,7 +36,7 @@ def cooperative_bug_isolation(
     """Options with the Importance of the predicate that holds in this run (Liblit et al. 2005, section 3), best first.
 
     Predicates are the quantile bins of an option's training values (its reference a bin of its own). A predicate
-    whose Increase is not above 0 with 95 % confidence has no importance.
+    whose Increase is not above 0 with 95% confidence has no importance.
     """
     scores = {
         name: _importance(_predicate_of(frame, config[name], schema.variables[name]), frame[name].to_numpy(), failed)

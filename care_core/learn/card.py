@@ -81,7 +81,7 @@ def _graph(model: Model) -> str:
     strong = sum(e.support >= 0.8 for e in model.edges.values())
     text = (
         f"## Graph\n\n{len(model.graph.nodes)} nodes, {len(model.edges)} directed edges "
-        f"({strong} found in at least 80 % of resamples), {len(model.bidirected)} confounded pairs."
+        f"({strong} found in at least 80% of resamples), {len(model.bidirected)} confounded pairs."
     )
     inert = [option for option in model.training.screened_out if not model.graph.children(option)]
     if inert:
@@ -107,7 +107,7 @@ def _paths(model: Model) -> str:
         for objective, paths in model.paths.items()
         for rank, path in enumerate(paths[:TOP], start=1)
     ]
-    header = ("objective", "rank", "path", "path ACE (90 % interval)", "direction", "edges in resamples")
+    header = ("objective", "rank", "path", "path ACE (90% interval)", "direction", "edges in resamples")
     return "## Strongest paths\n\nMean edge effect on scaled variables (Eq. 2).\n\n" + _table(header, rows)
 
 
@@ -179,7 +179,7 @@ def _effects(model: Model) -> str:
             seen = "" if e.support is None else f"{e.support:.0%}"
             size = f"{e.effect:.2f} ({e.low:.2f} to {e.high:.2f})"
             rows.append((objective, e.option, size, e.direction, seen, known))
-    header = ("objective", "option", "effect (90 % interval)", "direction", "path in resamples", "identified")
+    header = ("objective", "option", "effect (90% interval)", "direction", "path in resamples", "identified")
     return "## Total effects\n\nEq. 1 on scaled variables.\n\n" + _table(header, rows)
 
 

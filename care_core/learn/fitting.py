@@ -55,7 +55,7 @@ FARTHEST = 4.0
 """Standard deviations that a run is off at most where sets of inputs are compared: one of them decides nothing."""
 MANY_RUNS = 1000
 """From so many runs on folds begin where all runs led, for a fifth of the runs moves little. Of fewer, runs left out
-have a hand in that: of 196 missions of rovers intervals of 80 % held 71 % and not 76 %."""
+have a hand in that: of 196 missions of rovers intervals of 80% held 71% and not 76%."""
 
 
 Rows = NDArray[np.int64] | slice
@@ -223,9 +223,9 @@ def tested_on_runs_left_out(
 ) -> Mechanism:
     """The mechanism with the errors of mechanisms that were fitted without the runs they are tested on.
 
-    `left_out` keeps the relevances and the noise that all runs together chose, which flatters: intervals of 80 % held
-    72 % of the times of missions that are new altogether, and 59 % of those of new configurations in a campaign of 191
-    flights of one mission; these hold 74 % there. Cross-conformal levels (Vovk 2015; Barber et al. 2021, CV+) hold what
+    `left_out` keeps the relevances and the noise that all runs together chose, which flatters: intervals of 80% held
+    72% of the times of missions that are new altogether, and 59% of those of new configurations in a campaign of 191
+    flights of one mission; these hold 74% there. Cross-conformal levels (Vovk 2015; Barber et al. 2021, CV+) hold what
     they promise as far as the next run is one like these.
 
     Args:

@@ -16,7 +16,7 @@ from care_core.records import replace
 from care_core.variables import Role, Variable
 
 ENOUGH_PARTS = 10
-"""Thirty runs of three missions let a regression learn the missions by heart: energies were off by 20 %, not by 5 %."""
+"""Thirty runs of three missions let a regression learn the missions by heart: energies were off by 20%, not by 5%."""
 
 
 def relative(frame: pd.DataFrame, schema: Schema) -> pd.DataFrame:

@@ -156,12 +156,12 @@ class _Measured(Record):
     resampled: Floats
 
     def interval(self, support: float) -> tuple[float, float]:
-        """5 % and 95 % of the magnitudes in resamples."""
+        """5% and 95% of the magnitudes in resamples."""
         return _interval(self.resampled, support)
 
 
 def _interval(resampled: Floats, support: float) -> tuple[float, float]:
-    """5 % and 95 % of the magnitudes, the share of resamples in which the graph lacks the effect counted as zero."""
+    """5% and 95% of the magnitudes, the share of resamples in which the graph lacks the effect counted as zero."""
     low, high = (
         0.0 if share <= 1 - support else np.quantile(resampled, 1 - (1 - share) / support) for share in (0.05, 0.95)
     )

@@ -135,4 +135,4 @@ def inflation(file: LintedFile, radius: float | None, inflations: Sequence[Entry
         if radius is not None and entry.number is not None and 0 < entry.number < radius * (1 - 1e-6):
             text = f"inflation_radius ({entry.number:g} m) is smaller than the robot ({radius:.3g} m from its centre)."
             hint = "Plans may touch obstacles: give it at least the robot's inscribed radius."
-            yield file.warning("contradiction", entry, text, hint, _INFLATION)
+            yield file.warning("clearance", entry, text, hint, _INFLATION)

@@ -56,7 +56,7 @@ def _uncleared(file: LintedFile, reader: Reader) -> Iterator[Problem]:
                 text = f"{far} ({far_m:g} m{said[0]}) is above {short} ({short_m:g} m{said[1]})."
                 hint = "What is marked beyond is never cleared."
                 others = [marked] if cleared is not None and marked is not None else []
-                yield file.warning("contradiction", entry, text, hint, "obstacle_layer.cpp", others)
+                yield file.warning("hinders", entry, text, hint, "obstacle_layer.cpp", others)
 
 
 def _ordered(file: LintedFile, held: Readers) -> Iterator[Problem]:

@@ -29,6 +29,7 @@ RULES: tuple[Rule, ...] = (
     Rule("out-of-range", "A value outside the declared range.", _TABLES),
     Rule("not-in-values", "A value that is none of those declared.", _TABLES),
     Rule("wrong-unit", "A value off by the ratio of two units.", "the declared range, or what an angle can be"),
+    Rule("clearance", "A costmap in which plans may touch obstacles.", "the source that the problem names"),
     Rule("contradiction", "Two values that cannot both be meant.", "the source that the problem names"),
     Rule("cannot-work", "A value with which its node cannot do its work.", "the source that the problem names"),
     Rule("hinders", "A value that makes a mission likely to fail.", "the source that the problem names"),

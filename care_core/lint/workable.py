@@ -115,12 +115,12 @@ ABOVE: tuple[Above, ...] = (
     Above(("StaticLayer", COSTMAP), ("lethal_cost_threshold",), "every cell of the map is an obstacle",
           "static_layer.cpp, interpretValue"),
     Above((COSTMAP,), ("robot_radius",), "the robot has no size, and plans touch obstacles",
-          "costmap_2d_ros.cpp draws a circle of it where no footprint is set", rule="hinders"),
+          "costmap_2d_ros.cpp draws a circle of it where no footprint is set", rule="clearance"),
     Above(("amcl",), tuple(f"{odom}alpha{number}" for odom in ("", "odom_") for number in range(1, 6)),
           "it is a noise, of which amcl takes the root", "the motion models of amcl", zero=True),
     Above(("SmacPlannerHybrid",), ("minimum_turning_radius",), "there is no curve to search along",
           "node_hybrid.cpp of nav2_smac_planner takes the arc sine of sqrt(2) / (2 * radius)"),
-    Above(INFLATIONS, ("inflation_radius",), "plans may touch obstacles", "inflation_layer.cpp", rule="contradiction"),
+    Above(INFLATIONS, ("inflation_radius",), "plans may touch obstacles", "inflation_layer.cpp", rule="clearance"),
 )  # fmt: skip
 
 

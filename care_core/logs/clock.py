@@ -26,7 +26,7 @@ STEP_S = 5.0
 PAUSE_S = 86_400.0
 """A longer step forward is a clock that was set, no pause."""
 PACE = 1.2
-"""How far two clocks of one flight may run apart: in 24 logs of four firmwares they agree to 0.3 %."""
+"""How far two clocks of one flight may run apart: in 24 logs of four firmwares they agree to 0.3%."""
 _PIECE_S, _PIECES, _NOTHING_S = 10.0, 3, 1e-6
 """Seconds in which their paces are compared, fewest such pieces, and a clock that stands."""
 _STANDS = 1e3

@@ -46,7 +46,7 @@ class SeenEntry(Document, kw_only=True):
 
 
 class QuantileEntry(Document, kw_only=True):
-    """Where what 95 % of such runs stay within lies, with 90 %."""
+    """Where what 95% of such runs stay within lies, with 90%."""
 
     low: float
     high: float
@@ -189,7 +189,7 @@ def _of_objective(one: Proposal) -> Iterator[str]:
     if one.low is not None:
         side = "below" if one.op in ("<=", "<") else "above"
         yield from wrapped(
-            f"{CONTENT:.0%} stay {side} {one.low:.3g} to {one.high:.3g} {unit} ({one.method})", "  90 %     "
+            f"{CONTENT:.0%} stay {side} {one.low:.3g} to {one.high:.3g} {unit} ({one.method})", "  90%      "
         )
     bound = one.objective.relative
     if one.relative and one.limit is not None and bound is not None and bound.at_least is not None:

@@ -104,7 +104,7 @@ class ObjectiveEntry(Document, kw_only=True):
     kind: Kind
     threshold: ThresholdEntry | None
     needs: Need | None = None
-    """What the reference configuration would need for this mission, with its 80 % interval."""
+    """What the reference configuration would need for this mission, with its 80% interval."""
     basis: str = ""
     """What the threshold was made of, empty where it is a fixed one."""
     status: Status
@@ -262,7 +262,7 @@ class EvidenceEntry(Document, kw_only=True):
 
 
 class CircumstanceEntry(Document, kw_only=True):
-    """What the run met and no option set; `low` to `high` is where 95 % of the training runs lie."""
+    """What the run met and no option set; `low` to `high` is where 95% of the training runs lie."""
 
     circumstance: str
     variable: str | None

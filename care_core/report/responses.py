@@ -65,7 +65,7 @@ def response_figure(response: Response, name: str) -> Iterator[str]:
     yield f'<span class="quiet">{escape(clean(listed(response.told)))}{guess}</span></figcaption>'
     yield '<div class="area"><div class="y" aria-hidden="true">'
     for percentage in (0, 50, 100):
-        yield f'<span style="top:{100 - percentage}%">{percentage} %</span>'
+        yield f'<span style="top:{100 - percentage}%">{percentage}%</span>'
     yield '</div><div class="field">'
     yield f'<svg viewBox="0 0 {_WIDE} {_HIGH}" preserveAspectRatio="none" role="img" aria-labelledby="{name}-text">'
     yield f'<desc id="{name}-text">{escape(clean(_words(response)))}</desc>'

@@ -88,7 +88,7 @@ class Interval(Document, kw_only=True):
 
 
 class CheckedObjective(Document, kw_only=True):
-    """An objective in both runs; `inside` says whether the outcome lies in the promised 80 % interval."""
+    """An objective in both runs; `inside` says whether the outcome lies in the promised 80% interval."""
 
     before: ObjectiveEntry
     after: ObjectiveEntry

@@ -65,7 +65,7 @@ def _proposed(objective: Measure, good: Sequence[int], *, alike: bool) -> Propos
     if alike and values and min(values) > 0 and is_ceiling:
         found = upper_quantile([math.log(value) for value in values])
         if found is not None:
-            remark = f"what 95 % of runs like the {len(values)} good ones keep ({min(values):.4g} to {max(values):.4g})"
+            remark = f"what 95% of runs like the {len(values)} good ones keep ({min(values):.4g} to {max(values):.4g})"
             return ProposedThreshold(Threshold("<=", float(f"{math.exp(found.high):.3g}")), remark)
         worst = max(values)
         remark = f"{RATIO:g} x the largest of {len(values)} good runs ({min(values):.4g} to {worst:.4g})"

@@ -14,14 +14,14 @@ from care_core.application.deciding import changes_of
 from care_core.diagnose.records import Cause, Fix, helps
 from care_core.errors import CareError
 from care_core.records import replace
-from care_core.text import clean, number_of
+from care_core.text import clean, number_of, percent
 from care_tui.copying import copy
 from care_tui.pages.figured import LEAST_FIGURE
 from care_tui.pages.page import View, enter_to, sentence
 from care_tui.pages.proven import ProvenPage
 from care_tui.places import is_no_log
 from care_tui.render.fix import about_rows, no_fix_rows
-from care_tui.render.rows import Row, Rows, command_rows, diff_rows, error_rows, heading, labelled, percent, warning
+from care_tui.render.rows import Row, Rows, command_rows, diff_rows, error_rows, heading, labelled, warning
 from care_tui.screens.confirm import Confirm
 from care_tui.screens.file_dialog import FileDialog
 

@@ -133,7 +133,7 @@ class FixPage(FiguredPage, DiagnosisPage):
 
     @property
     def _about_prediction(self) -> str:
-        return f"Predicted {'with what is ticked' if self.session.basket.ticked else 'as driven'} (80 % intervals)"
+        return f"Predicted {'with what is ticked' if self.session.basket.ticked else 'as driven'} (80% intervals)"
 
     def _place(self, options: list[Variable]) -> int | None:
         names = [option.name for option in options]

@@ -14,11 +14,11 @@ from care_core.application.proof import Subject
 from care_core.diagnose.records import Cause, ObjectiveResult
 from care_core.records import Record
 from care_core.run import is_known
-from care_core.text import figures
+from care_core.text import figures, percent
 from care_core.variables import Role, Variable
 from care_tui.pages.figured import FiguredPage
 from care_tui.pages.page import View, enter_to, sentence
-from care_tui.render.rows import FEW_RESAMPLES, Row, Rows, heading, labelled, measure, padded, percent, warning
+from care_tui.render.rows import FEW_RESAMPLES, Row, Rows, heading, labelled, measure, padded, warning
 from care_tui.render.tree import tree_rows
 from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
@@ -136,7 +136,7 @@ class GraphPage(FiguredPage):
         sign = {"cause": f"{glyphs.to} it", "effect": f"it {glyphs.to}", "confounded": f"{glyphs.root} both"}[link.kind]
         effect = "" if link.effect is None else f"{link.effect:+.2f}"
         held = (
-            "" if link.support is None else f"in {percent(link.support):>5}{' of resamples' if width > NARROW else ''}"
+            "" if link.support is None else f"in {percent(link.support):>4}{' of resamples' if width > NARROW else ''}"
         )
         few = "  ! few" if link.support is not None and link.support < FEW_RESAMPLES else ""
         return Content.assemble(f"{sign:<7} ", padded(link.name, 24, "bold"), f" {effect:>6}  {held}{few}")

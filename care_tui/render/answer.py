@@ -9,10 +9,10 @@ from textual.content import Content
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.diagnose.verdict import LINE, fit_line, hypothesis_text, verdict_of
 from care_core.ecosystems.findings import every_finding
-from care_core.text import clean, listed
+from care_core.text import clean, listed, percent
 from care_tui.render.health import warnings_of
 from care_tui.render.odds import bar, promise
-from care_tui.render.rows import Glyphs, change_text, percent, progress_bar, status, text
+from care_tui.render.rows import Glyphs, change_text, progress_bar, status, text
 from care_tui.session import Session
 
 _LABEL = 9
@@ -84,7 +84,7 @@ def _cause_and_change(session: Session, glyphs: Glyphs, width: int, *, is_low: b
             _labelled("Cause")
             + bar(first.probability, glyphs)
             + Content.assemble(
-                (f" {percent(first.probability):>5}  ", "bold"),
+                (f" {percent(first.probability):>4}  ", "bold"),
                 lead,
                 text(hypothesis_text(first, found, diagnosis.outside), "bold"),
                 (doubt, "$text-warning"),

@@ -12,7 +12,7 @@ from care_core.diagnose.records import Cause, Diagnosis, Hypothesis, ObjectiveRe
 from care_core.diagnose.verdict import hypothesis_text
 from care_core.ecosystems.findings import Finding
 from care_core.run import gathered, shown
-from care_core.text import clean, seconds
+from care_core.text import clean, percent, seconds
 from care_core.variables import Variable
 from care_tui.render.fix import prediction
 from care_tui.render.objectives import meaning
@@ -28,7 +28,6 @@ from care_tui.render.rows import (
     labelled,
     limit,
     measure,
-    percent,
     setting,
     status,
     text,
@@ -79,13 +78,13 @@ def hypothesis_item(
 def _share(share: float | None, glyphs: Glyphs) -> Content:
     """The probability as a number and a bar, or as much room."""
     if share is None:
-        return Content(" " * (BAR + 8))
-    return Content.assemble((f"{percent(share):>5} ", "bold"), bar(share, glyphs, BAR), "  ")
+        return Content(" " * (BAR + 7))
+    return Content.assemble((f"{percent(share):>4} ", "bold"), bar(share, glyphs, BAR), "  ")
 
 
 def lowers(cause: Cause) -> str:
     """What the option's value does to the run's odds."""
-    points = percent(cause.contribution).removesuffix(" %")
+    points = percent(cause.contribution).removesuffix("%")
     return f"lowers the odds by {points} point{'' if points == '1' else 's'}"
 
 

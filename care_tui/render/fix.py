@@ -116,7 +116,7 @@ def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[
 
 def about_rows(fix: Fix, diagnosis: Diagnosis, glyphs: Glyphs) -> list[Row]:
     """What a change is predicted to bring, and what is known of each parameter that it changes."""
-    rows = [heading("Predicted with it (80 % intervals)"), *outcome_rows(fix, diagnosis.objectives, glyphs)]
+    rows = [heading("Predicted with it (80% intervals)"), *outcome_rows(fix, diagnosis.objectives, glyphs)]
     for one in fix.changes:
         head, *known = known_rows(one.option, diagnosis.run)
         change = change_text(one.option, one.current, one.is_assumed, one.suggested, glyphs)
@@ -138,7 +138,7 @@ def known_rows(option: Variable, run: Run) -> list[Row]:
 
 
 def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs, *, is_guess: bool = False) -> Content:
-    """`█████████░  91 %  139, 131 to 150 s`: how likely the objective is kept, and the value with its interval."""
+    """`█████████░  91%  139, 131 to 150 s`: how likely the objective is kept, and the value with its interval."""
     odds = Content("odds not measured") if predicted.p_ok is None else promise(predicted.p_ok, glyphs)
     guess = Content.styled(" a guess" if is_guess else "", "$text-warning")
     if variable.kind == "functional":  # a yes-or-no objective has a probability, not a value

@@ -11,9 +11,9 @@ from care_core.ecosystems.findings import Event, Finding, Health, Severity
 from care_core.records import Record, replace
 from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, noted
-from care_core.text import seconds
+from care_core.text import percent, seconds
 from care_tui.render.objectives import damage
-from care_tui.render.rows import Glyphs, Row, cut, heading, labelled, padded, percent, text, warning
+from care_tui.render.rows import Glyphs, Row, cut, heading, labelled, padded, text, warning
 
 TIME_WIDTH, KIND_WIDTH = 8, 10
 _SHORT = {"led to": "led to", "followed by": "then", "seen just before it": "before"}

@@ -10,7 +10,7 @@ from textual.content import Content
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.run import Damage, Evidence, gathered, is_known, place_of_damage
-from care_core.text import clean, seconds
+from care_core.text import clean, percent, seconds
 from care_tui.render.rows import (
     LABEL_WIDTH,
     Glyphs,
@@ -20,7 +20,6 @@ from care_tui.render.rows import (
     labelled,
     measure,
     padded,
-    percent,
     status,
     text,
     warning,

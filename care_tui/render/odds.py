@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from textual.content import Content
 
-from care_tui.render.rows import Glyphs, percent
+from care_core.text import percent
+from care_tui.render.rows import Glyphs
 
 WIDTH = 10
 LIKELY, EVEN = 0.8, 0.5
@@ -23,6 +24,6 @@ def odds_style(share: float) -> str:
 
 
 def promise(share: float, glyphs: Glyphs, width: int = WIDTH) -> Content:
-    """`████████░░  86 %`, by how likely it is that it is kept."""
+    """`████████░░  86%`, by how likely it is that it is kept."""
     style = odds_style(share)
-    return Content.assemble(bar(share, glyphs, width, style), Content.styled(f" {percent(share):>5}", f"bold {style}"))
+    return Content.assemble(bar(share, glyphs, width, style), Content.styled(f" {percent(share):>4}", f"bold {style}"))

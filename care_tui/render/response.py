@@ -11,7 +11,7 @@ from care_tui.render.odds import promise
 from care_tui.render.plot import AXIS, LOWEST, Column, dots_across, plot, pointer_row
 from care_tui.render.rows import ASCII, Glyphs, Row, cut, padded, text
 
-TICKS = {0.0: "0 %", 0.5: "50 %", 1.0: "100 %"}
+TICKS = {0.0: "0%", 0.5: "50%", 1.0: "100%"}
 GUESS = "dotted: no training run came near, a guess"
 
 

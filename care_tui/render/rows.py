@@ -227,11 +227,6 @@ def warning(label: str, value: str) -> Row:
     return labelled(f"! {label}", value, "bold $text-warning")
 
 
-def percent(share: float) -> str:
-    """A share as reports have it, with a space for the screen."""
-    return words.percent(share).replace("%", " %")
-
-
 def measure(value: float | None, unit: str) -> str:
     """A number with its unit, `unknown` where there is none."""
     return "unknown" if value is None else f"{value:.4g} {unit}".rstrip()
@@ -290,7 +285,7 @@ def progress_bar(fraction: float, glyphs: Glyphs) -> Content:
     """How much of the work is done; drawn when the engine reports, never on a timer."""
     done = round(PROGRESS_WIDTH * min(max(fraction, 0.0), 1.0))
     bar = glyphs.done * done + glyphs.ahead * (PROGRESS_WIDTH - done)
-    return Content(f"{bar} {percent(done / PROGRESS_WIDTH)}")
+    return Content(f"{bar} {words.percent(done / PROGRESS_WIDTH)}")
 
 
 def error_rows(error: CareError) -> Rows:

@@ -9,6 +9,7 @@ import pytest
 from care_core.application.case import Request, open_case
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import every_finding
+from tests.ros_drives import ABORTED, Drive
 from tests.wrong_parameters import START, Wrong, drive, rewritten
 
 LOCAL, CONTROLLER = "/local_costmap/local_costmap", "/controller_server"
@@ -103,6 +104,28 @@ def test_of_two_that_contradict_each_other_the_one_far_from_its_default_is_named
     assert "min_vel_x" in names
     assert "/move_base/DWAPlannerROS/max_vel_x" not in names
     assert "/move_base/controller_patience" in names
+
+
+COSTMAP = """local_costmap:
+  local_costmap:
+    ros__parameters:
+      robot_radius: 0.3
+      plugins: [inflation_layer]
+      inflation_layer: {{plugin: "nav2_costmap_2d::InflationLayer", inflation_radius: {radius}}}
+"""
+
+
+@pytest.mark.parametrize(("radius", "lead"), [(0.12, "parameter"), (0.55, "world")])
+def test_what_a_robot_is_caught_on_follows_from_plans_that_may_touch_it(
+    tmp_path: Path, radius: float, lead: str
+) -> None:
+    file = tmp_path / "nav2.yaml"
+    file.write_text(COSTMAP.format(radius=radius))
+    diagnosis = diagnosed(Drive(fault="blocked", outcome=ABORTED).write(tmp_path / "drive.mcap"), file)
+    assert diagnosis.hypotheses[0].what == lead
+    (held,) = (one for one in every_finding(diagnosis.health.findings) if one.kind == "blocked")
+    clear = [one for one in diagnosis.health.findings if one.kind == "clearance"]
+    assert [held in one.consequences for one in clear] == ([True] if lead == "parameter" else [])
 
 
 UNANSWERED = "Timed out while waiting for action server to acknowledge goal request for follow_path"

@@ -145,8 +145,8 @@ async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_v
             await settle(pilot, key)
             fault, cause, change, limits = pinned(app)
             assert fault.startswith("✗ FAULT  too slow: 187.2 s")
-            assert cause.startswith("Cause    █████████░  90 %  motor 2 lost thrust")
-            assert "91 %  LAND_SPEED 16 → 50 cm/s" in change
+            assert cause.startswith("Cause    █████████░  90%  motor 2 lost thrust")
+            assert "91%  LAND_SPEED 16 → 50 cm/s" in change
             assert limits.startswith("! Profile arducopter partly fits: the firmware is 4.3.6, ")
             assert all(len(line) <= 78 for line in pinned(app))
     app = make_app(sample.crashed())

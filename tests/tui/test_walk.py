@@ -152,7 +152,7 @@ async def test_the_path_follows_the_highlighted_cause(make_app: MakeApp) -> None
         assert "LAND_SPEED    16 cm/s  (expected 50)" in text(app)
         assert "resamples" not in text(app), "statistics are behind a key"
         await settle(pilot, "z")
-        assert "effect -0.81 sd, in 97 % of resamples" in text(app)
+        assert "effect -0.81 sd, in 97% of resamples" in text(app)
         assert "outside the training support" in text(app)
         assert "Runner-up     WPNAV_SPEED, lowers the odds by 6 points" in text(app)
         await settle(pilot, "j")
@@ -209,7 +209,7 @@ async def test_a_cause_set_aside_takes_what_brings_nothing_out_of_the_fix(make_a
     app = make_app(made)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3", "d", *"as agreed", "enter")
-        assert walk(app).session.basket.ticked == {}, "3 % where 2 % was is worth no change"
+        assert walk(app).session.basket.ticked == {}, "3% where 2% was is worth no change"
         assert "nothing is ticked" in answer(app)
         await settle(pilot, "4", "s")
         assert walk(app).session.basket.ticked == {}
@@ -257,7 +257,7 @@ async def test_the_boxes_decide_the_probability_and_what_diff_and_report_hold(ma
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4")
-        assert "Change   █████████░  91 %  LAND_SPEED 16 → 50 cm/s  without 2 %" in answer(app)
+        assert "Change   █████████░  91%  LAND_SPEED 16 → 50 cm/s  without 2%" in answer(app)
         assert title(app) == "What to change: 1 change ticked"
         assert "[x] LAND_SPEED   16 → 50 cm/s" in items(app)
         assert "[ ] WPNAV_SPEED  1000 → 1400 cm/s" in items(app)
@@ -265,7 +265,7 @@ async def test_the_boxes_decide_the_probability_and_what_diff_and_report_hold(ma
         assert "nothing ticked" in title(app)
         assert "[ ] LAND_SPEED" in items(app)
         await settle(pilot, "j", "space")
-        assert "45 %  WPNAV_SPEED" in answer(app)
+        assert "45%  WPNAV_SPEED" in answer(app)
         assert "! reboot" in items(app)
         await settle(pilot, "5")
         assert text(app).startswith("--- driven\n+++ suggested\n-WPNAV_SPEED 1000\n+WPNAV_SPEED 1400\n")
@@ -379,7 +379,7 @@ def test_names_are_cut_before_odds_are(room: int) -> None:
     columns = OptionColumns.sharing(room, len(long.name), change.cell_length)
     line = option_item(long, change, True, 0.45, columns, UNICODE).plain
     assert len(line) <= room
-    assert "45 %" in line
+    assert "45%" in line
     assert change.plain in line
     assert re.search(r"\[x\] infl.*….*costmap ", line), "of a name both ends tell most"
 
@@ -521,7 +521,7 @@ async def test_enter_on_what_was_not_evaluated_leads_to_the_fault_that_has_cause
 
 async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app: MakeApp) -> None:
     lead = replace(sample.FLIES_SLOWLY, rank=1, is_lead=True, contribution=0.0)
-    wind = Circumstance("wind", "wind_proxy", 9.0, "m/s", 0.0, 6.0, 0.01, "stronger than in 99 % of the training runs")
+    wind = Circumstance("wind", "wind_proxy", 9.0, "m/s", 0.0, 6.0, 0.01, "stronger than in 99% of the training runs")
     diagnosis = replace(
         sample.abstaining(),
         faults=(Fault(sample.SLOW, (lead,)),),
@@ -538,7 +538,7 @@ async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app
         assert "No change advised" in lines[0]
         assert lines[1:5] == [
             "It may not be a parameter",
-            "- wind: stronger than in 99 % of the training runs",
+            "- wind: stronger than in 99% of the training runs",
             "How to find out more",
             "- run the same configuration again",
         ]

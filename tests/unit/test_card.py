@@ -91,7 +91,7 @@ def test_a_vehicles_card_names_the_parameters_that_were_screened(planted: Profil
 
 
 def test_the_card_is_that_of_the_model_as_it_is_written(planted: Profile, tmp_path: Path) -> None:
-    """In memory 0.9749999 is 97 %, in the file 0.975, which is 98 %."""
+    """In memory 0.9749999 is 97%, in the file 0.975, which is 98%."""
     shares = {"time": replace(UNKNOWN_CARRY_OVER, same=0.97499999)}
     model = replace(planted.model, training=replace(planted.model.training, carry_over=shares))
     write_model(model, tmp_path)

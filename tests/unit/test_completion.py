@@ -103,7 +103,7 @@ def test_options_that_do_nothing_get_no_edge_at_the_given_rate() -> None:
         rng = np.random.default_rng(1000 + seed)
         frame = table(80, seed, m=rng.normal(size=80), n=rng.exponential(size=80), y=rng.normal(size=80))
         any_added += bool(complete(frame, schema, empty(schema), ["a", "b", "c"], rate=0.1).graph.directed)
-    assert any_added <= 19  # binomial(100, 0.1): more in 0.2 % of the cases
+    assert any_added <= 19  # binomial(100, 0.1): more in 0.2% of the cases
 
 
 def test_constraints_and_acyclicity_are_respected() -> None:

@@ -128,8 +128,8 @@ def test_the_odds_without_a_change_are_never_cut_off() -> None:
     for width in (64, 79, 119):
         (line,) = (one for one in answer_lines(session, UNICODE, width, is_low=False) if one.plain.startswith("Change"))
         assert line.cell_length <= width
-        assert line.plain.startswith("Change   █████████░  90 %  land_speed")
-        assert line.plain.endswith(" and 1 more  without 2 %")
+        assert line.plain.startswith("Change   █████████░  90%  land_speed")
+        assert line.plain.endswith(" and 1 more  without 2%")
 
 
 def test_a_value_that_no_source_holds_is_shown_as_assumed_in_every_output(reading: Reading) -> None:
@@ -178,7 +178,7 @@ def test_no_probability_outside_the_training_runs_stands_without_its_warning(rea
         assert unwarned(shown[name], fix) == [], name
     assert json.loads(shown["json"])["fix"]["guess"] is True
     rows = [row.content.plain for row in outcome_rows(fix, made.objectives, UNICODE)]
-    assert [row for row in rows if "92 %" in row and "a guess" not in row] == []
+    assert [row for row in rows if "92%" in row and "a guess" not in row] == []
 
     answer = reading.question.ask({OPTION: 400.0})
     asked = Fix(answer.changes, answer.p_ok, {str(i): one.predicted for i, one in enumerate(answer.outlooks)})
@@ -204,5 +204,5 @@ def test_every_promise_stands_beside_the_odds_as_driven() -> None:
     assert "(90%; as driven 5%)" in shown["history"]
     assert json.loads(shown["json"])["odds_as_driven"] == 0.05
     cause, result = diagnosis.faults[0].causes[0], diagnosis.faults[0].objective
-    (odds,) = [row.content.plain for row in worth_rows(cause, result, 0.05, UNICODE) if "90 %" in row.content.plain]
-    assert odds.endswith("90 %  without 5 %")
+    (odds,) = [row.content.plain for row in worth_rows(cause, result, 0.05, UNICODE) if "90%" in row.content.plain]
+    assert odds.endswith("90%  without 5%")

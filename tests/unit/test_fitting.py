@@ -77,7 +77,7 @@ def test_knows_less_away_from_the_data() -> None:
 
 
 def test_intervals_hold_what_they_promise() -> None:
-    """Of new runs, eight of ten fall inside the 80 % interval."""
+    """Of new runs, eight of ten fall inside the 80% interval."""
     x, new = RNG(0).uniform(0, 1, (200, 3)), RNG(1).uniform(0, 1, (1000, 3))
     noise = 0.2 * RNG(2).standard_t(5, size=1200)
     m = fitted(x, 2 * x[:, 0] + noise[:200])

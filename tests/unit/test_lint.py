@@ -146,7 +146,7 @@ def test_inflation_is_weighed_against_the_footprint_and_types_against_what_is_de
     not_loaded = (11, "not-loaded", "note")
     assert told(tmp_path, "a.yaml", COSTMAP.format(rate="5.0", radius="0.55")) == [not_loaded]
     assert told(tmp_path, "a.yaml", COSTMAP.format(rate="5.0", radius="0.15")) == [
-        (9, "contradiction", "warning"),
+        (9, "clearance", "warning"),
         not_loaded,
     ]
     assert told(tmp_path, "a.yaml", COSTMAP.format(rate="5", radius="0.55")) == [(4, "wrong-type", "error"), not_loaded]
@@ -371,7 +371,7 @@ LAYERED = """local_costmap:
         ("marking: true", "marking: false", "hinders"),
         ("clearing: true", "clearing: false", "hinders"),
         ("enabled: true", "enabled: false", "hinders"),
-        ("raytrace_max_range: 3.0", "raytrace_max_range: 2.0", "contradiction"),
+        ("raytrace_max_range: 3.0", "raytrace_max_range: 2.0", "hinders"),
         ("obstacle_max_range: 2.5", "obstacle_max_range: 0.0", "cannot-work"),
         ("[obstacle_layer]", f"[static_layer, obstacle_layer]{MAPPED.format('false')}", "hinders"),
         ("[obstacle_layer]", f"[static_layer, obstacle_layer]{MAPPED.format('true')}", ""),

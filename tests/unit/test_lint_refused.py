@@ -235,7 +235,7 @@ def test_a_behavior_tree_without_a_folder(tmp_path: Path, tree: str, rules: list
     [
         ("footprint: '[[0.2, 0.2], [-0.2, -0.2]]'", ["cannot-work"]),
         ("footprint: '[]'", []),
-        ("robot_radius: 0.0", ["hinders"]),
+        ("robot_radius: 0.0", ["clearance"]),
         ("robot_radius: 0.2", []),
     ],
 )

@@ -139,7 +139,7 @@ def test_the_smaller_of_both_accelerations_plans_a_rovers_mission() -> None:
 def test_a_rover_is_no_faster_than_its_throttle_allows() -> None:
     slow = of_rover("drive_cruise_time", full_throttle_speed=4.0, throttle_limit=50.0)
     assert slow == pytest.approx(of_rover("drive_cruise_time", speed=2.0))
-    # A limit below 30 % counts as 30 %.
+    # A limit below 30% counts as 30%.
     low = {"full_throttle_speed": 4.0, "throttle_limit": 10.0}
     assert of_rover("drive_cruise_time", **low) == pytest.approx(of_rover("drive_cruise_time", speed=1.2))
 

@@ -185,7 +185,7 @@ def test_parts_of_which_one_holds_nearly_all_runs_are_no_test() -> None:
 
 
 def test_intervals_of_a_campaign_with_one_mission_hold_what_they_promise() -> None:
-    """Of new configurations, eight of ten fall inside the 80 % interval, though some training runs never began."""
+    """Of new configurations, eight of ten fall inside the 80% interval, though some training runs never began."""
     frame = climbs(460, missions=1)
     campaign, new = frame[:160].copy(), frame[160:]
     campaign.loc[20:28, ["takeoff_height", "takeoff_time"]] = np.nan

@@ -73,6 +73,18 @@ def test_a_fault_is_the_first_finding_with_its_onset(fault: str, kind: str, susp
     assert first.probability > 0.5
 
 
+@pytest.mark.parametrize("crawls", [False, True])
+@pytest.mark.parametrize(
+    ("fault", "title"),
+    [("held", "something holds the robot"), ("stall", "the drive does not answer its commands")],
+)
+def test_current_tells_a_robot_that_is_held_from_a_drive_that_is_dead(
+    fault: str, title: str, crawls: bool, tmp_path: Path
+) -> None:
+    first = looked_at(Drive(fault, ABORTED, waits_s=4.0, crawls=crawls), tmp_path).findings[0]
+    assert first.title.startswith(title)
+
+
 def frozen(message: Any) -> None:
     message.pose.pose.position.x = message.pose.pose.position.y = message.twist.twist.linear.x = 0.0
 

@@ -112,7 +112,7 @@ def test_a_current_that_only_the_default_scale_makes_the_charge_that_was_used(sc
     made.drive("BATT_AMP_PERVLT", scale, 17.0)
     finding = naming(made, "BATT_AMP_PERVLT")
     assert finding.wanted == (("BATT_AMP_PERVLT", 17.0),)
-    assert "the voltage at rest says that 50 % were used" in finding.evidence
+    assert "the voltage at rest says that 50% were used" in finding.evidence
     energy = energy_of(made)
     assert isinstance(energy, Unavailable)
     assert "BATT_AMP_PERVLT" in energy.reason

@@ -122,7 +122,7 @@ def test_a_mode_that_minds_a_stick_at_its_bottom_brings_a_copter_down(falls_s: f
 
 
 def on_a_bench() -> Made:
-    """Motors at 40 % and more for a minute and a half, one far above the others, and nothing moves."""
+    """Motors at 40% and more for a minute and a half, one far above the others, and nothing moves."""
     made = Made()
     for name, field in HEIGHTS:
         made.table[name][field][:] = made.noise(0.1)

@@ -79,7 +79,7 @@ def test_no_other_clock_is_used_where_the_core_writes_text() -> None:
     assert users == ["axes.py"]
 
 
-@pytest.mark.parametrize("figure", ["1.8 s", "109.5 s (1:49)", "12 m/s", "3500 mAh", "19 %", "12.6 V", "400 Hz"])
+@pytest.mark.parametrize("figure", ["1.8 s", "109.5 s (1:49)", "12 m/s", "3500 mAh", "19%", "12.6 V", "400 Hz"])
 def test_no_line_ends_between_a_number_and_its_unit(figure: str) -> None:
     for width in range(20, 40):
         assert any(figure in line for line in wrapped(f"the vehicle was seen {figure}, and that is all", width=width))

@@ -345,7 +345,7 @@ def test_an_elevator_that_trims_the_speed_as_well_has_no_wrong_trim() -> None:
 
 @pytest.mark.parametrize("offset", [0.0, 2000.0])
 def test_a_surface_whose_trim_is_off_is_not_reversed(offset: float) -> None:
-    """Out by 45 % of its travel in straight flight, it turns the plane left when it is out by less than that."""
+    """Out by 45% of its travel in straight flight, it turns the plane left when it is out by less than that."""
     flown = MadePlane()
     now = flown.after(50.0, 53.0)
     flown.table["AETR"]["Ail"] = flown.table["AETR"]["Ail"] + offset

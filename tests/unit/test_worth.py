@@ -68,7 +68,7 @@ def test_a_change_that_adds_too_little_is_named_and_not_advised() -> None:
     said = falls_short(fix, [LATE], as_driven=0.3)
     assert said is not None
     assert "land_speed 16 -> 50, has 40%, as driven 30%" in said
-    assert "mission_time is 90 % sure to reach 124 s, the limit of 100 s is out of reach" in said
+    assert "mission_time is 90% sure to reach 124 s, the limit of 100 s is out of reach" in said
 
 
 def test_no_parameter_is_advised_where_a_part_explains_more() -> None:

@@ -9,8 +9,8 @@ from care_core.numbers import Floats
 
 # What the goals of training took at the reference configuration of move_base (0.5 m/s, 1 rad/s): the way at full speed,
 # the turns at full rate, and 4 s a goal to speed up, to find the way and to come to rest. The medians of five goals,
-# 33 to 41 runs each, lie within 10 % of it. What other speeds do is learned as a ratio: with the run's own speed in its
-# place, times of runs left out were predicted to 21 % instead of 20 % (rms of the logarithm).
+# 33 to 41 runs each, lie within 10% of it. What other speeds do is learned as a ratio: with the run's own speed in its
+# place, times of runs left out were predicted to 21% instead of 20% (rms of the logarithm).
 _GOAL_S, _METRE_S, _RADIAN_S = 4.0, 2.0, 1.0
 _DRIVE_W = 80.0
 """Power of a robot of this size on its way; a mechanism learns the ratio to it."""

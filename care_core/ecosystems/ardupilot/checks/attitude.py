@@ -2,7 +2,7 @@
 
 ArduPilot's crash check calls 30 degrees off the demand a loss of control (crash_check.cpp); in good flights roll and
 pitch follow within a few degrees (ArduPilot, Diagnosing problems using logs: mechanical failure). In nine of ten
-healthy training flights the error is below 7 degrees for 95 % of the time, in the rest bad gains make it swing.
+healthy training flights the error is below 7 degrees for 95% of the time, in the rest bad gains make it swing.
 """
 
 from __future__ import annotations

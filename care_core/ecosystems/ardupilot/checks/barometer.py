@@ -68,7 +68,7 @@ _ON_WINGS = calibrated(
 )
 _LOST_P = LIMITS.add(
     "probability that it costs the mission", 0.55, "",
-    "12 of those 17 failed, of flights without a failed part 48 % (a critical finding counts as four flights)",
+    "12 of those 17 failed, of flights without a failed part 48% (a critical finding counts as four flights)",
 )  # fmt: skip
 _ODDS_P = LIMITS.add("probability where a range finder contradicts it", 0.3, "", "a choice: either may be wrong")
 _RANGE_GOOD = 4

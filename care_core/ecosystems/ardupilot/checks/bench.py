@@ -44,7 +44,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         end_s=span[1],
         severity="info",
         evidence=(
-            f"its lean changed by less than {_STIRS_DEG:g} degrees at up to {100 * most:.0f} % throttle: "
+            f"its lean changed by less than {_STIRS_DEG:g} degrees at up to {100 * most:.0f}% throttle: "
             "without propellers, or held down"
         ),
         source="ATT, CTUN.ThO, BARO.Alt",

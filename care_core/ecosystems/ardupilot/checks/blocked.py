@@ -2,7 +2,7 @@
 leans against what it hit.
 
 Limits of a rover are those by which the firmware itself calls it crashed or blocked (Rover/crash_check.cpp): in a mode
-that drives by itself, for 2 s, a throttle of 5 % or more with less than 0.08 m/s and less than 0.08 rad/s of turn. The
+that drives by itself, for 2 s, a throttle of 5% or more with less than 0.08 m/s and less than 0.08 rad/s of turn. The
 check of the firmware acts only where FS_CRASH_CHECK is set, which it is not as shipped.
 """
 
@@ -55,8 +55,8 @@ def find(flight: Flight) -> Iterator[Finding]:
             end_s=end,
             severity="critical",
             evidence=(
-                f"for {end - start:.0f} s below {STANDING_MS:g} m/s at up to {most:.0f} % throttle "
-                f"(limit {THROTTLE_PERCENT:g} % for {_LASTS_S:g} s)"
+                f"for {end - start:.0f} s below {STANDING_MS:g} m/s at up to {most:.0f}% throttle "
+                f"(limit {THROTTLE_PERCENT:g}% for {_LASTS_S:g} s)"
             ),
             source="THR, STER; Rover/crash_check.cpp",
             suspect="world",

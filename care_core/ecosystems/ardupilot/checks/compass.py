@@ -1,8 +1,8 @@
 """Compasses: dead, at odds with each other, disturbed by the motors' currents, at odds with the estimator.
 
 Limits: two compasses may differ by 200 mGauss in the level plane (AP_Compass.h: AP_COMPASS_MAX_XY_LENGTH_DIFF) and 90
-degrees (AP_COMPASS_MAX_XYZ_ANG_DIFF); of the field's length 30 % may come from the motors, 60 % are too much
-(ArduPilot, Compass setup: below 30 % is good, 30 to 60 % a grey area); a length is plausible between 185 and 875 mGauss
+degrees (AP_COMPASS_MAX_XYZ_ANG_DIFF); of the field's length 30% may come from the motors, 60% are too much
+(ArduPilot, Compass setup: below 30% is good, 30 to 60% a grey area); a length is plausible between 185 and 875 mGauss
 (AP_Arming). On the training table healthy compasses agree to a mGauss: those of a simulator are alike.
 """
 
@@ -39,7 +39,7 @@ LIMITS = Limits()
 APART = LIMITS.add("two compasses apart in the level plane", 200.0, "mGauss", "AP_COMPASS_MAX_XY_LENGTH_DIFF")
 MOVED = LIMITS.add(
     "change of their difference in flight", 140.0, "mGauss",
-    "70 % of what arming allows, since turning alone moves it where their calibrations differ",
+    "70% of what arming allows, since turning alone moves it where their calibrations differ",
 )  # fmt: skip
 _LEANS_DEG = LIMITS.add(
     "lean at which compasses are compared", 60.0, "deg", "a choice: further over calibrations no longer cancel"
@@ -69,7 +69,7 @@ _LOST_ON_WINGS_P = LIMITS.add(
 )
 _LOST_P = LIMITS.add(
     "probability that it costs the mission", 0.65, "",
-    "6 of 8 such training flights failed, of those without a failed part 48 % (a critical finding counts as four)",
+    "6 of 8 such training flights failed, of those without a failed part 48% (a critical finding counts as four)",
 )  # fmt: skip
 _DEAD_P = LIMITS.add("probability of a dead compass", 0.95, "", "its field is zero, or it says so itself")
 _REFUSED_P = LIMITS.add("probability where arming was refused for it", 0.7, "", "the firmware's own word")
@@ -268,8 +268,8 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             end_s=float(first.t[-1]),
             severity="critical" if share > TOO_MUCH and _rejected(flight, 0.0) else "warning",
             evidence=(
-                f"the field changes by {100 * share:.0f} % with the throttle (correlation {match:.2f}; limit 30 %, "
-                "above 60 % it is unusable)"
+                f"the field changes by {100 * share:.0f}% with the throttle (correlation {match:.2f}; limit 30%, "
+                "above 60% it is unusable)"
             ),
             source="MAG against CTUN.ThO; ArduPilot, Compass setup",
             probability=_MOTORS_MUCH_P if share > TOO_MUCH else _MOTORS_P,

@@ -57,11 +57,11 @@ def find(flight: Flight) -> Iterator[Finding]:
         slow |= share > LONG_SHARE
         if (slow & armed).any():
             said.append(
-                f"{100 * float(np.max(share[armed])):.0f} % of the loops are long (limit {100 * LONG_SHARE:.0f})"
+                f"{100 * float(np.max(share[armed])):.0f}% of the loops are long (limit {100 * LONG_SHARE:.0f})"
             )
     if "Load" in table.columns and (table["Load"][armed] > FULL_LOAD).any():
         slow |= table["Load"] > FULL_LOAD
-        said.append(f"load {float(np.max(table['Load'][armed])) / 10:.0f} %")
+        said.append(f"load {float(np.max(table['Load'][armed])) / 10:.0f}%")
     spans = lasting(table.t, slow & armed, _LASTS_S, gap_s=15.0, records=2)
     if spans and said:
         yield Finding(

@@ -1,7 +1,7 @@
 """The estimator: test ratios over their limit, failsafes, resets and changes of lane.
 
 A ratio above 1 means that a measurement is rejected (AP_NavEKF3: innovation test ratios); the firmware's check acts at
-FS_EKF_THRESH, 0.8, of two of them for a second (ekf_check.cpp). 97.5 % of the healthy training flights stay below 0.16.
+FS_EKF_THRESH, 0.8, of two of them for a second (ekf_check.cpp). 97.5% of the healthy training flights stay below 0.16.
 """
 
 from __future__ import annotations

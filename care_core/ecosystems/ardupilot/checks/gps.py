@@ -3,7 +3,7 @@
 Limits: a position may leave what its velocity and 10 m/s^2 predict by 5 m (AP_GPS_Glitch of Copter 3.1:
 GPSGLITCH_RADIUS 5 m, GPSGLITCH_ACCEL 10 m/s^2); the estimator wants 6 satellites and an HDop below 2.5
 (AP_NavEKF3_VehicleStatus.cpp); HDop below 1.5 is good, over 2 poor (ArduPilot, Diagnosing problems using logs). The
-largest jump of 97.5 % of the healthy training flights is 0.4 m.
+largest jump of 97.5% of the healthy training flights is 0.4 m.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ _FEW = calibrated(
 )
 _LOST_P = LIMITS.add(
     "probability that few satellites cost the mission", 0.15, "",
-    "4 of 11 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
+    "4 of 11 such training flights failed, of those without a failed part 48% (a warning counts as four flights)",
 )  # fmt: skip
 _DRIVES_MS, _DRIVES_S = (
     LIMITS.add("speed that drives", 1.5, "m/s", "a choice: a receiver's speed wanders by less as it stands"),

@@ -2,7 +2,7 @@
 
 Limits: gyros that differ by more than 5 degrees/s and accelerometers by more than 0.75 m/s^2 refuse arming (AP_Arming:
 gyros consistent, ARMING_ACCTHRESH). In flight vibration makes both differ: only noise that the measured vibration does
-not explain counts. 97.5 % of the healthy training flights differ by less than 0.02 degrees/s on their quietest
+not explain counts. 97.5% of the healthy training flights differ by less than 0.02 degrees/s on their quietest
 axis.
 """
 
@@ -58,7 +58,7 @@ _ACC_PER_VIBE = LIMITS.add(
     "m/s^2",
     "a choice: two sensors on one board share most of the shaking",
 )
-_OF_RATE = LIMITS.add("share of a rate that two gyros differ by", 0.06, "", "MPU-6000: sensitivity +-3 % each")
+_OF_RATE = LIMITS.add("share of a rate that two gyros differ by", 0.06, "", "MPU-6000: sensitivity +-3% each")
 _FAST_DPS = LIMITS.add("rate below which that is nothing", 30.0, "deg/s", "a choice: noise is more")
 _CALM_S = LIMITS.add(
     "time in which it hardly turns that tells of noise", 1.0, "s", "a choice: of less time a median is chance"
@@ -79,7 +79,7 @@ _HELD_DEG = LIMITS.add(
     "attitude error of what no longer holds it",
     10.0,
     "deg",
-    "a choice: nine of ten healthy training flights are below 7 deg for 95 % of the time",
+    "a choice: nine of ten healthy training flights are below 7 deg for 95% of the time",
 )
 _HELD_SHARE = LIMITS.add(
     "share of the flight with such an error", 0.02, "", "a choice: gusts and take-offs take less of it"
@@ -92,7 +92,7 @@ _CALIBRATION = calibrated(
 )
 _LOST_P = LIMITS.add(
     "probability that noise costs the mission", 0.15, "",
-    "4 of 10 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
+    "4 of 10 such training flights failed, of those without a failed part 48% (a warning counts as four flights)",
 )  # fmt: skip
 _OF_CHANGE = LIMITS.add(
     "difference of a plane's gyros, as a share of its rates' change",

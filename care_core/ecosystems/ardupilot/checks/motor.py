@@ -303,10 +303,10 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     yield _finding(
         outputs.motors[n], "lost thrust" if changed or over > 2 else "works harder than the others", start, end,
         _severity(flight, limit, size) if changed or over > 2 else "warning",
-        f"it is asked for {100 * median(share[n]):.0f} % where the others are at "
-        f"{100 * median(np.delete(share, n, axis=0)):.0f} % (limit: {100 * ALONE:.0f} points above them)"
+        f"it is asked for {100 * median(share[n]):.0f}% where the others are at "
+        f"{100 * median(np.delete(share, n, axis=0)):.0f}% (limit: {100 * ALONE:.0f} points above them)"
         + ("; before, they were even" if changed else "")
-        + (f"; at its limit {100 * limit:.0f} % of the time" if limit > 0.05 else ""),
+        + (f"; at its limit {100 * limit:.0f}% of the time" if limit > 0.05 else ""),
         _SOURCE, calibrated_probability(over, _CALIBRATION if changed or over > 2 else _ALWAYS),
     )  # fmt: skip
 
@@ -368,7 +368,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     yield _finding(
         outputs.motors[n], "gave too little thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0,
         "critical",
-        f"asked for {100 * share[n]:.0f} % (others {100 * median(others):.0f} %), yet the vehicle fell towards it: "
+        f"asked for {100 * share[n]:.0f}% (others {100 * median(others):.0f}%), yet the vehicle fell towards it: "
         f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
         f"{_SOURCE}, and ATT", _GAVE_LITTLE_P if near[0].sum() > 3 else _PERHAPS_P,
     )  # fmt: skip

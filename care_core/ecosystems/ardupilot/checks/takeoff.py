@@ -209,7 +209,7 @@ def _no_motors(flight: Flight) -> Finding | None:
         end_s=float(table.t[full][-1]),
         severity="critical",
         evidence=(
-            f"with the throttle above {100 * _FULL:.0f} % outputs {', '.join(map(str, resting))} stay within "
+            f"with the throttle above {100 * _FULL:.0f}% outputs {', '.join(map(str, resting))} stay within "
             f"{_RESTS_BY_US:g} us of {_RESTS_US:g} us, and it does not rise; FRAME_CLASS is {kind:g}"
             f"{_default_words(values['FRAME_CLASS'])}: set it as the frame is built"
         ),

@@ -1,7 +1,7 @@
 """Too little thrust: all that the motors have is used, or hovering takes most of it.
 
 The firmware learns a hover throttle up to 0.6875 (AP_MotorsMulticopter.h: AP_MOTORS_THST_HOVER_MAX); a vehicle that
-needs more has too little in hand to keep its attitude. 97.5 % of the healthy training flights hover below 0.68.
+needs more has too little in hand to keep its attitude. 97.5% of the healthy training flights hover below 0.68.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _NEARLY_FULL = LIMITS.add(
 _SINKS_MS = LIMITS.add(
     "sink that goes on with it", 1.0, "m/s", "a choice: what has thrust to spare has stopped by then"
 )
-_LEVEL_DEG = LIMITS.add("lean of what should not sink with it", 25.0, "deg", "its lift is 9 % less")
+_LEVEL_DEG = LIMITS.add("lean of what should not sink with it", 25.0, "deg", "its lift is 9% less")
 _FULL_LASTS_S = LIMITS.add("shortest time at full throttle", 3.0, "s", "a choice: a gust is over sooner")
 _BELOW_M = LIMITS.add("height below the one wanted", 2.0, "m", "a choice: height control is within a metre")
 _CLIMBS_MS = LIMITS.add("climb of what has thrust to spare", 1.0, "m/s", "a choice: half of PILOT_SPEED_UP as shipped")
@@ -77,8 +77,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         yield _too_little(flight, full, begin, before) if full else _sinks(flight, strained, before)
     elif high and seconds_in(high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
         share = 100 * float(median(level[flown]))
-        evidence = f"mean throttle {share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %)"
-        title = f"hovering takes {share:.0f} % of the throttle"
+        evidence = f"mean throttle {share:.0f}% (the firmware learns up to {100 * HOVER_MOST:.0f}%)"
+        title = f"hovering takes {share:.0f}% of the throttle"
         yield _finding(flight, title, (high[0][0], high[-1][1]), "warning", evidence)
 
 
@@ -92,8 +92,8 @@ def _too_little(flight: Flight, full: list[Span], begin: float, before: float) -
     below, lasted = _below(flight, start, end), seconds_in(full)
     grounded = not flight.flown and lasted > _GROUNDED_S
     lost = flight.impact_s is not None or any(code for _, code in flight.errors(BATTERY_FAILSAFE))
-    since = f"{100 * HOVER_MOST:.0f} % from {log_time(begin, 0)} on, above " if begin < start else ""
-    evidence = f"throttle above {since}{100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
+    since = f"{100 * HOVER_MOST:.0f}% from {log_time(begin, 0)} on, above " if begin < start else ""
+    evidence = f"throttle above {since}{100 * FULL:.0f}% for {lasted:.0f} s from {log_time(start, 0)} on"
     evidence += f", {below:.1f} m below the height wanted" if below else ""
     evidence += _until_then(before)
     severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
@@ -103,14 +103,14 @@ def _too_little(flight: Flight, full: list[Span], begin: float, before: float) -
 
 
 def _until_then(before: float) -> str:
-    return f"; before that the throttle was at {100 * before:.0f} %"
+    return f"; before that the throttle was at {100 * before:.0f}%"
 
 
 def _sinks(flight: Flight, sinking: list[Span], before: float) -> Finding:
     """It sinks though the motors give nearly all."""
     start, end = sinking[0][0], sinking[-1][1]
     evidence = (
-        f"throttle above {100 * _NEARLY_FULL:.0f} % for {seconds_in(sinking):.0f} s from {log_time(start, 0)} on, and "
+        f"throttle above {100 * _NEARLY_FULL:.0f}% for {seconds_in(sinking):.0f} s from {log_time(start, 0)} on, and "
         f"it sank by {_sank_m(flight, *sinking[0]):.1f} m at that{_until_then(before)}"
     )
     found = _finding(flight, "too little thrust", (start, end), "critical", evidence)

@@ -91,8 +91,8 @@ def _fought(flight: Flight) -> Iterator[Finding]:
         end_s=spans[-1][1],
         severity="warning",
         evidence=(
-            f"{100 * took:.0f} % of its control of the {named} for {seconds_in(spans):.0f} s, with no turn "
-            f"asked for (limit {100 * limit:.0f} %)"
+            f"{100 * took:.0f}% of its control of the {named} for {seconds_in(spans):.0f} s, with no turn "
+            f"asked for (limit {100 * limit:.0f}%)"
         ),
         source="RATE.ROut, YOut; ATT.DesRoll, DesYaw",
         probability=_FAILED_P,

@@ -2,7 +2,7 @@
 
 Limits: "levels below 30 m/s/s are normally acceptable, above 30 may have problems, above 60 nearly always have
 problems"; clipping should be 0, and some hundred clips are a serious problem (ArduPilot, Measuring Vibration).
-97.5 % of the healthy training flights lie below 1.6 m/s^2.
+97.5% of the healthy training flights lie below 1.6 m/s^2.
 """
 
 from __future__ import annotations

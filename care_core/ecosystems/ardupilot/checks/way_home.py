@@ -116,8 +116,8 @@ def _slow_phase(flight: Flight, phase: _Slow) -> Iterator[Finding]:
         severity="warning",
         evidence=(
             f"{phase.shown}: {phase.parameter} is {value:g} (default {default:g}); that took "
-            f"{phase.costs_s:.0f} s more than the default, {100 * share:.0f} % of the rest of the flight (limit "
-            f"{_COSTS_S:g} s and {100 * least:.0f} %)"
+            f"{phase.costs_s:.0f} s more than the default, {100 * share:.0f}% of the rest of the flight (limit "
+            f"{_COSTS_S:g} s and {100 * least:.0f}%)"
         ),
         source="POS, MODE, MSG; PARM",
         suspect="parameter",

@@ -1,7 +1,7 @@
 """The health checks of ROS recordings, one module each.
 
 Probabilities: in `benchmarks.ros_health` all 29 findings of failed hardware were right, on few missions of one
-simulated robot; 0.9 is the 95 % lower bound of that. What it does not show (tf, imu, topics, messages) is judged.
+simulated robot; 0.9 is the 95% lower bound of that. What it does not show (tf, imu, topics, messages) is judged.
 """
 
 from __future__ import annotations

@@ -17,9 +17,9 @@ from care_core.numbers import median, quantile
 LIMITS = Limits()
 DROP = LIMITS.add(
     "share of the voltage lost", 0.08, "",
-    "a charged battery loses a fifth from full to empty, over an hour; the largest step of 301 healthy missions: 0.1 %",
+    "a charged battery loses a fifth from full to empty, over an hour; the largest step of 301 healthy missions: 0.1%",
 )  # fmt: skip
-DROP_IN_S = LIMITS.add("time in which it is lost", 5.0, "s", "healthy missions fall by 0.1 % a second at most")
+DROP_IN_S = LIMITS.add("time in which it is lost", 5.0, "s", "healthy missions fall by 0.1% a second at most")
 STAYS = LIMITS.add("share of the drop that stays", 0.7, "", "one sample that reads low is a bad reading")
 STAYS_SAMPLES = LIMITS.add("samples after a drop", 5, "", "fewer do not show that it stays")
 STAYS_SHARE = LIMITS.add("share of later samples that stay low", 0.8, "", "a load that goes is no drop")
@@ -81,7 +81,7 @@ def _drops(drive: Drive, battery: Battery) -> Iterator[Finding]:
             # A robot that drives on as commanded was not stopped by it.
             severity="warning" if obeys(drive, at) else drive.severity(at, "critical"),
             evidence=f"{before:.1f} V to {now:.1f} V within {took_s:.0f} s, more than its load explains",
-            source=f"{battery.topic}; healthy missions fall by 0.1 % a second at most",
+            source=f"{battery.topic}; healthy missions fall by 0.1% a second at most",
             probability=0.9,
         )
         return

@@ -37,9 +37,9 @@ ORDINARY_MPS = LIMITS.add("command that no robot is too slow for", 0.5, "m/s", "
 STILL = LIMITS.add("speed and turn of a standstill", 0.02, "m/s, rad/s", "noise of odometry at rest")
 SLOW_S = LIMITS.add("time below the commanded speed", 5.0, "s", f"{_HEALTHY}: 1.9 s at most")
 SLOW = LIMITS.add("share of the commanded speed", 0.7, "", f"{_HEALTHY}: below it for 1.9 s at most")
-STOPS = LIMITS.add("standstills close together", 4, "", f"97.5 % of {_HEALTHY}: at most 4")
-STOPS_IN_S = LIMITS.add("time in which they lie", 20.0, "s", f"97.5 % of {_HEALTHY}: at most 4 standstills")
-STOPPED_S = LIMITS.add("time that they take together", 4.0, "s", f"97.5 % of {_HEALTHY}: 1.6 s")
+STOPS = LIMITS.add("standstills close together", 4, "", f"97.5% of {_HEALTHY}: at most 4")
+STOPS_IN_S = LIMITS.add("time in which they lie", 20.0, "s", f"97.5% of {_HEALTHY}: at most 4 standstills")
+STOPPED_S = LIMITS.add("time that they take together", 4.0, "s", f"97.5% of {_HEALTHY}: 1.6 s")
 PULL_RADPM = LIMITS.add("turn beyond the commands", 0.12, "rad/m", f"none of {_HEALTHY} pulls so")
 PULL_SAMPLES = int(LIMITS.add("samples that pull", 25, "", f"with 20 one of {_HEALTHY} pulls, with 15 five"))
 PULL_OF_EACH = LIMITS.add("samples of commands to one side", 4, "", "fewer tell nothing of that side")
@@ -70,6 +70,7 @@ STRAIGHT_RADPS = LIMITS.add("turn of a command to go straight on", 0.5, "rad/s",
 SLOW_LOST_S = LIMITS.add("pause between slow samples", 2.0, "s", "over a longer one nobody knows how fast it was")
 FASTER = LIMITS.add("ratio of speeds that shows a drive was not weak", 1.3, "", "clearly more than noise of odometry")
 LOAD = LIMITS.add("share of the driving current beyond idle", 0.5, "", "wheels that turn or push draw it")
+CRAWLS = LIMITS.add("least share of the driving speed that is held against it", 0.2, "", "noise of the current")
 IDLE = LIMITS.add("ratio of driving to idle current", 1.2, "", "a smaller one does not tell them apart")
 DRIVES_MPS = LIMITS.add("speed at which current is that of driving", 0.1, "m/s", "slower, little is drawn")
 RESTS = LIMITS.add("speed and turn at which current is idle", 0.01, "m/s, rad/s", "noise of odometry at rest")
@@ -142,7 +143,7 @@ def _finding(
         end_s=span[1],
         severity=drive.severity(span[0], otherwise),
         evidence=evidence,
-        source=f"{drive.odometry.topic} against {drive.commands.topic}; limits: 97.5 % of healthy move_base missions"
+        source=f"{drive.odometry.topic} against {drive.commands.topic}; limits: 97.5% of healthy move_base missions"
         " stay far below them",
         suspect=suspect,
         probability=probability,
@@ -259,12 +260,15 @@ def _standing(drive: Drive, motion: Following, long: list[Span]) -> Finding:
     wanted = float(median(np.abs(motion.wanted_speed[inside])))
     order = f"commanded {wanted:.2f} m/s" if wanted > 0 else "commanded to turn"
     evidence = f"{order} for {total_s:.0f} s, odometry stands"
-    currents = (currents for battery in drive.batteries if (currents := _currents(battery, motion, long)) is not None)
-    drawn, idle, driving = next(currents, (np.nan, np.nan, np.nan))
-    if np.isnan(drawn):
+    told = (currents for battery in drive.batteries if (currents := _currents(battery, motion, long)) is not None)
+    currents = next(told, None)
+    if currents is None:
         return _finding(drive, "the robot does not move though commanded", span, evidence, otherwise="critical")
+    drawn, idle, driving = currents.standing, currents.idle, currents.driving
     evidence += f"; current {drawn:.1f} A, idle {idle:.1f} A, driving {driving:.1f} A"
-    if drawn - idle > LOAD * (driving - idle):
+    # What is told to crawl draws little, moving or held; what gets no command through draws nothing.
+    asked = max(wanted / currents.speed_mps, CRAWLS) if wanted > 0 else 1.0
+    if drawn - idle > LOAD * min(asked, 1.0) * (driving - idle):
         return _finding(
             drive, "something holds the robot: its motors push, it does not move", span, evidence,
             kind="blocked", otherwise="critical", suspect="world", probability=0.85,
@@ -272,8 +276,19 @@ def _standing(drive: Drive, motion: Following, long: list[Span]) -> Finding:
     return _finding(drive, "the drive does not answer its commands", span, evidence, otherwise="critical")
 
 
-def _currents(battery: Battery, motion: Following, long: list[Span]) -> tuple[float, float, float] | None:
-    """Current while standing, while idle and while driving, A; None where the recording does not tell them apart."""
+class _Currents(NamedTuple):
+    """What is drawn in each state, A."""
+
+    standing: float
+    """Against commands."""
+    idle: float
+    driving: float
+    speed_mps: float
+    """At which it drives then."""
+
+
+def _currents(battery: Battery, motion: Following, long: list[Span]) -> _Currents | None:
+    """What is drawn standing, idle and driving; None where the recording does not tell them apart."""
     odometry = motion.odometry
     stood = np.zeros(len(battery.t), bool)
     for start, end in long:
@@ -284,7 +299,7 @@ def _currents(battery: Battery, motion: Following, long: list[Span]) -> tuple[fl
     if min(np.count_nonzero(rows) for rows in (stood, drives, idles)) < CURRENTS:
         return None
     drawn, idle, driving = (known_median(battery.drawn[rows]) for rows in (stood, idles, drives))
-    return (drawn, idle, driving) if driving > IDLE * idle > 0 else None
+    return _Currents(drawn, idle, driving, float(median(speed[drives]))) if driving > IDLE * idle > 0 else None
 
 
 def _unbroken(t: Floats, stood: Bools) -> list[Span]:

@@ -23,7 +23,7 @@ from care_core.numbers import Floats, median, quantile
 
 LIMITS = Limits()
 _HEALTHY = "301 healthy move_base missions"
-_DRIFT = f"{_HEALTHY}: 97.5 % stay below"
+_DRIFT = f"{_HEALTHY}: 97.5% stay below"
 _WAY = "a drift shows over more than the noise of a step, or sooner where it is strong"
 _SPIKES = "drivers that repeat a pose make up to 8 times the speed, 3 m/s, of the step that follows"
 BEYOND = LIMITS.add("speed against the most that positions give", 10.0, "", _SPIKES)
@@ -272,7 +272,7 @@ def _drifting(
         end_s=float(odometry.t[rows[-1]]),
         severity=drive.severity(start),
         evidence=f"the position advances {abs(typical):.0%} {word} than the speed says, and agreed before",
-        source=f"{odometry.topic}: position against its own speed; healthy move_base missions stay below 4 %",
+        source=f"{odometry.topic}: position against its own speed; healthy move_base missions stay below 4%",
         probability=0.9,
     )
 

@@ -20,7 +20,7 @@ from care_core.text import log_time, shortened
 LIMITS = Limits()
 SHARE = LIMITS.add("messages a second", 0.1, "1/s", "loops that miss now and then are no fault")
 FEWEST = LIMITS.add("messages", 3.0, "", "loops that miss now and then are no fault")
-FASTEST = LIMITS.add("ratio of two clocks", APART, "", "a real clock is right to 0.01 %")
+FASTEST = LIMITS.add("ratio of two clocks", APART, "", "a real clock is right to 0.01%")
 SLOW = LIMITS.add("share of its rate at which a control loop runs", 0.2, "", "a choice: five steps on one command")
 SLOW_SENT = LIMITS.add(
     "the same, by the commands that are recorded", 0.12, "", "a choice: recordings thinned to 2 Hz have 0.2 and more"

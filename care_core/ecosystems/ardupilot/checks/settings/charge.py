@@ -91,9 +91,9 @@ def _wrong_scale(flight: Flight, battery: Battery, table: Table) -> Finding | No
         return None
     return _finding(
         flight, "BATT_AMP_PERVLT", default, "the battery's current is measured at a wrong scale",
-        f"{drawn:.0f} mAh is {100 * drawn / capacity:.0f} % of BATT_CAPACITY {capacity:g}, and the voltage at rest "
-        f"says that {100 * used:.0f} % were used (limits {_LEAST:g} and {_MOST:g} times that), with BATT_AMP_PERVLT="
-        f"{scale:.4g} (default {default:.4g}, at which it would be {100 * drawn / capacity * default / scale:.0f} %)",
+        f"{drawn:.0f} mAh is {100 * drawn / capacity:.0f}% of BATT_CAPACITY {capacity:g}, and the voltage at rest "
+        f"says that {100 * used:.0f}% were used (limits {_LEAST:g} and {_MOST:g} times that), with BATT_AMP_PERVLT="
+        f"{scale:.4g} (default {default:.4g}, at which it would be {100 * drawn / capacity * default / scale:.0f}%)",
         "BAT.Curr over the flight against BAT.Volt before and after it", _LIKELY_P,
     )  # fmt: skip
 

@@ -209,8 +209,8 @@ def _mended_by_others(compasses: list[_Compass]) -> Iterator[Undone]:
                 wanted=one.measured(name, default, expected),
                 title=_title(one, name),
                 evidence=(
-                    f"compasses {one.number} and {other.number} differ by {100 * apart:.0f} % of the field (limit "
-                    f"{100 * limit:.0f} %) with {name}={one.flight.setting(name):g}, and would by {100 * left:.0f} % "
+                    f"compasses {one.number} and {other.number} differ by {100 * apart:.0f}% of the field (limit "
+                    f"{100 * limit:.0f}%) with {name}={one.flight.setting(name):g}, and would by {100 * left:.0f}% "
                     f"with its default {default:g}"
                 ),
             )
@@ -258,8 +258,8 @@ def _turned(one: _Compass, driven: Course, course: Callable[[Floats], Course]) -
                 title=_title(one, name),
                 evidence=(
                     f"with {name}={number:g} the heading of compass {one.number} explains "
-                    f"{100 * max(driven.explained, 0):.0f} % of how the vehicle sped up where it leaned, with "
-                    f"{mounting:g} it would {100 * told.explained:.0f} %"
+                    f"{100 * max(driven.explained, 0):.0f}% of how the vehicle sped up where it leaned, with "
+                    f"{mounting:g} it would {100 * told.explained:.0f}%"
                 ),
             )
     return None

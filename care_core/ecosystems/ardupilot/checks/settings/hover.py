@@ -167,7 +167,7 @@ def _swings(flight: Flight) -> Iterator[Finding]:
             onset_s=(flight.flown or spans)[0][0],
             end_s=(flight.flown or spans)[-1][1],
             severity="critical",
-            evidence=f"half of the time it is {100 * swing:.0f} % and more off its mean (limit {100 * limit:.0f} %)"
+            evidence=f"half of the time it is {100 * swing:.0f}% and more off its mean (limit {100 * limit:.0f}%)"
             + (f" with {', '.join(told)}" if told else " where it holds its height itself, with no gain raised"),
             source="CTUN.ThO",
             suspect="parameter",

@@ -38,7 +38,7 @@ _SLOW = LIMITS.add(
     "airspeed, as a share of AIRSPEED_MIN, below which a plane stalls",
     0.85,
     "",
-    "a choice: near the stall, which AIRSPEED_MIN is to be 25 % above (ArduPilot, Airspeed Parameters Setup)",
+    "a choice: near the stall, which AIRSPEED_MIN is to be 25% above (ArduPilot, Airspeed Parameters Setup)",
 )
 _SLOW_S = LIMITS.add("shortest time so slow", 2.0, "s", "a choice: a gust is over sooner")
 _SINKS_MS = LIMITS.add("sink of a stall", 3.0, "m/s", "a choice: TECS_SINK_MIN is 2 as shipped")

@@ -50,7 +50,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         end_s=end,
         severity="critical",
         evidence=(
-            f"{end - start:.0f} s of {100 * _SPENT:.0f} % and more of what the lift motors may give, without "
+            f"{end - start:.0f} s of {100 * _SPENT:.0f}% and more of what the lift motors may give, without "
             f"rising{ended}"
         ),
         source="QTUN.ThO, height; PARM",

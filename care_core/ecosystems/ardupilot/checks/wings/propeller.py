@@ -2,7 +2,7 @@
 below its airspeed: the motor, its controller or the propeller failed.
 
 The current of a propeller goes with the square of its throttle, near enough: over 300 simulated flights with a sound
-motor it stays within 0.93 and 1.08 times what it was, at any throttle above 30 %.
+motor it stays within 0.93 and 1.08 times what it was, at any throttle above 30%.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def _draws_less(flight: Flight) -> Iterator[Finding]:
         end_s=spans[-1][1],
         severity="critical",
         evidence=(
-            f"{now:.1f} A at {100 * float(np.mean(throttle[held])):.0f} % throttle, which drew {before:.1f} A "
+            f"{now:.1f} A at {100 * float(np.mean(throttle[held])):.0f}% throttle, which drew {before:.1f} A "
             "before "
             f"(limit {_DROP:g} of it)"
         ),

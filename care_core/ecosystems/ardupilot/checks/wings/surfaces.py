@@ -150,7 +150,7 @@ def _wrong_way(surface: _Surface, flown: _Flown) -> Finding | None:
         end_s=end,
         severity="critical",
         evidence=(
-            f"{way} by {100 * out:.0f} % of the travel, and {goes} by {turned:.0f} deg within {end - start:.1f} s "
+            f"{way} by {100 * out:.0f}% of the travel, and {goes} by {turned:.0f} deg within {end - start:.1f} s "
             f"(limit {_TURNED_DEG:g}): "
             + (
                 "stuck, hard over or torn off, for the autopilot flew by it before"
@@ -187,7 +187,7 @@ def _keeps_it_down(flight: Flight, surface: _Surface, flown: _Flown) -> Finding 
         end_s=end,
         severity="critical",
         evidence=(
-            f"on the take-off run it is up by {100 * float(np.mean(flown.out[held])):.0f} % of the travel for "
+            f"on the take-off run it is up by {100 * float(np.mean(flown.out[held])):.0f}% of the travel for "
             f"{end - start:.0f} s above {least:.0f} m/s, with the nose at {float(np.mean(flown.angle[held])):.0f} deg: "
             "reversed, jammed or not connected"
         ),
@@ -248,7 +248,7 @@ def _at_its_stop(flight: Flight, surface: _Surface, flown: _Flown) -> Finding | 
         end_s=spans[-1][1],
         severity="critical",
         evidence=(
-            f"out by {100 * float(np.mean(np.abs(flown.out[held]))):.0f} % of the travel for "
+            f"out by {100 * float(np.mean(np.abs(flown.out[held]))):.0f}% of the travel for "
             f"{sum(b - a for a, b in spans):.0f} s, where {float(median(np.abs(flown.wanted - flown.rate)[held])):.0f} "
             f"deg/s are lacking (limit {_LACKS_DPS:g})"
         ),
