@@ -17,6 +17,7 @@ from care_tui.app import CareApp
 from care_tui.engine import Engine
 from care_tui.screens.case import CaseScreen
 from care_tui.settings import Settings
+from care_tui.widgets.keys import Keys
 from tests.tui import sample_diagnosis as sample
 
 LOG = Path("/flights/00000042.BIN")
@@ -152,8 +153,9 @@ async def quiet(pilot: Pilot[int]) -> None:
 
 
 def _is_under_way(app: object) -> bool:
-    """Whether a log is to be read and no work on it has begun or ended, or a page is not laid out and drawn yet: the
-    first begins after a frame, the second when the page has settled and was told its size; on a loaded machine late."""
+    """Whether a log is to be read and no work on it has begun or ended, or a page is not laid out and drawn yet, or its
+    keys are not told: the first begins after a frame, the second when the page has settled and was told its size; on a
+    loaded machine late."""
     if not isinstance(app, CareApp) or app._exit:
         return False
     state = app.workspace.session.state
@@ -166,4 +168,5 @@ def _is_under_way(app: object) -> bool:
     says = state in ("error", "data") or (state == "empty" and screen.here != "logs")
     cursor = (page.choices.highlighted or 0) * page.choices.listing.height  # a list scrolls to it once it was laid out
     is_seen = not page.choices.display or page.choices.top <= cursor < page.choices.top + page.choices.room.height
-    return bool(app._batch_count) or not is_seen or (page.FITS and says and not page.reader.plain)
+    keys_are_late = any(one._is_asked for one in screen.query(Keys))
+    return bool(app._batch_count) or keys_are_late or not is_seen or (page.FITS and says and not page.reader.plain)
