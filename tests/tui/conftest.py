@@ -32,6 +32,7 @@ def _nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monkey
     for name in ("XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
         monkeypatch.setenv(name, str(folder))
     monkeypatch.setenv("CARE_HISTORY", str(folder / "history.sqlite3"))
+    monkeypatch.setattr("tempfile.tempdir", str(folder))  # what is copied lies in a file as well
     for name in ("NO_COLOR", "TEXTUAL_THEME", "TMUX", "SSH_CONNECTION"):
         monkeypatch.delenv(name, raising=False)
 
