@@ -7,7 +7,8 @@ the failure (`tried`), and which repaired it (`fixing`); or it is what `benchmar
 was used for training. Told are
 
 - hypotheses: of every option that was off, and of hardware where some failed, how likely it acted, against whether it
-  is in a set that repaired the mission; the leading ones apart;
+  is in a set that repaired the mission; the leading ones apart; none of a mission that only everything together is
+  known to repair, three options and more: that tells nothing of which of them acted;
 - promises: of every option that was put back alone the odds, against whether the mission then met everything;
 - advised: the odds of what is advised, against whether that repaired the mission where it was flown, or else whether it
   holds a set that did: only the smallest sets were looked for, so counting those flown alone would leave out most that
@@ -54,6 +55,8 @@ from care_core.records import Record, Struct, field
 HARDWARE = "hardware"
 MOST_MISSIONS = 8
 """A way that has not repaired the robot by then puts everything back."""
+FEW = 2
+"""As many options at most were put back together, beside all of them."""
 DRAWN = 1000
 Truth = dict[str, Any]
 Pairs = list[tuple[float, float]]
@@ -73,6 +76,14 @@ class Failure(Record, eq=False):
     @property
     def fixing(self) -> list[frozenset[str]]:
         return [frozenset(names) for names in self.truth.get("fixing") or ()]
+
+    @property
+    def acted(self) -> frozenset[str] | None:
+        """What is in a set that repaired the mission; None where none but all that was off is known to."""
+        whole = {HARDWARE, *deviating(self.query.config, self.query.reference)}
+        if any(len(names) <= FEW or whole - names - {HARDWARE} for names in self.fixing):
+            return frozenset().union(*self.fixing)
+        return None
 
     @property
     def tried(self) -> dict[frozenset[str], bool]:
@@ -168,9 +179,11 @@ def _peer_of(one: Failure, tables: Path, known: dict[str, PlainClassifier | None
 
 
 def _count_hypotheses(told: Told, one: Failure) -> None:
-    if not one.case.diagnosis.hypotheses:
-        return  # it was not flagged, which is counted apart
-    true = frozenset().union(*one.fixing)
+    if not one.case.diagnosis.hypotheses:  # it was not flagged, which is counted apart
+        return
+    true = one.acted
+    if true is None:
+        return
     hypotheses, failure = one.case.diagnosis.hypotheses, one.case.diagnosis.failure
     named = {h.name: h.acts for h in hypotheses if h.what == "parameter" and h.name}
     parts = max((h.acts for h in hypotheses if h.what == HARDWARE), default=0.0)

@@ -13,6 +13,7 @@ from care_core.diagnose.remedies import CHARGE
 from care_core.ecosystems.findings import (
     BY_STICK,
     CAME_DOWN,
+    HASTY,
     NO_MISSION,
     NOT_BEGUN,
     OF_MONITOR,
@@ -55,7 +56,7 @@ def never_flew(findings: Iterable[Finding]) -> bool:
     got no power, or nothing told it to lift."""
     found = tuple(every_finding(findings))
     return was_refused(found) or any(
-        one.title in (NO_MISSION, NOT_BEGUN, UNPOWERED) and one.severity == "critical" for one in found
+        one.title in (HASTY, NO_MISSION, NOT_BEGUN, UNPOWERED) and one.severity == "critical" for one in found
     )
 
 

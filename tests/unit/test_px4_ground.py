@@ -7,6 +7,7 @@ import pytest
 
 from care_core.diagnose.parts import never_flew
 from care_core.ecosystems.findings import (
+    HASTY,
     NO_MISSION,
     NO_POSITION_FOR,
     NOT_BEGUN,
@@ -153,6 +154,26 @@ def test_a_mission_that_is_not_flown_though_it_was_armed_for_it_never_began(
         )
     ]  # fmt: skip
     assert (NOT_BEGUN in titles) == is_told
+
+
+@pytest.mark.parametrize(
+    ("waits_s", "spools_s", "named"),
+    [(10.0, 20.0, ("COM_SPOOLUP_TIME",)), (0.5, 1.0, ("COM_DISARM_PRFLT",)), (10.0, 1.0, ()), (-1.0, 20.0, ())],
+)
+def test_a_vehicle_that_is_disarmed_while_it_spools_up_was_set_so(
+    waits_s: float, spools_s: float, named: tuple[str, ...]
+) -> None:
+    held = {"COM_DISARM_PRFLT": (waits_s, 10.0), "COM_SPOOLUP_TIME": (spools_s, 1.0)}
+    log = MadeLog(
+        {
+            "vehicle_status": states(arming_state=[(0, 1), (10, 2), (20, 1)], nav_state=[(0, 3)], failsafe=[(0, 0)]),
+            "logged_messages": Table(np.array([20.0]), {"level": np.array(["INFO"]), "message": np.array(
+                ["Disarmed by auto preflight disarming"])}),
+        },
+        parameters={name: (Setting(name, value, "PARM", default=shipped),) for name, (value, shipped) in held.items()},
+    )  # fmt: skip
+    told = [one for one in examine(Px4Flight(log)).findings if one.title == HASTY]
+    assert [one.parameters for one in told] == ([named] if named else [])
 
 
 @pytest.mark.parametrize(

@@ -61,6 +61,10 @@ def states(**changes: Sequence[tuple[float, float]]) -> Table:
     return Table(t, columns)
 
 
+def set_to(value: float) -> tuple[Setting, ...]:
+    return (Setting("", value, "PARM", default=0.0),)
+
+
 def words(*said: tuple[float, str, str]) -> Table:
     t, levels, texts = zip(*said, strict=True)
     return Table(np.array(t), {"level": np.array(levels, object), "message": np.array(texts, object)})
@@ -99,6 +103,32 @@ def test_flags_raised_in_flight_are_findings_and_those_before_arming_are_not() -
     ]  # fmt: skip
     assert "radio lost for 3.0 s" in texts(health, "error")
     assert not any("ground station" in text for text in texts(health))
+
+
+@pytest.mark.parametrize(("mode", "acts", "severity"), [(3, 1, "critical"), (2, 1, "info"), (3, 0, "info")])
+def test_a_link_on_whose_loss_a_mission_was_broken_off_is_the_reason(mode: int, acts: int, severity: str) -> None:
+    flown = states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, mode), (30, 5)],
+                   failsafe=[(0, 0), (30, acts)])  # fmt: skip
+    lost = states(gcs_connection_lost=[(0, 0), (29.8, 1), (40, 0)])
+    log = MadeLog({"vehicle_status": flown, "failsafe_flags": lost}, parameters={"NAV_DLL_ACT": set_to(3.0)})
+    (finding,) = (one for one in examine(Px4Flight(log)).findings if one.kind == "radio")
+    assert (finding.severity, "NAV_DLL_ACT is 3" in finding.evidence) == (severity, severity == "critical")
+
+
+@pytest.mark.parametrize(
+    ("flag", "name"),
+    [
+        ("flight_time_limit_exceeded", "COM_FLT_TIME_MAX"),
+        ("wind_limit_exceeded", "COM_WIND_MAX"),
+        ("geofence_breached", ""),
+    ],
+)
+def test_a_limit_at_which_a_failsafe_acted_names_its_parameter(flag: str, name: str) -> None:
+    flown = states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 3), (30, 5)], failsafe=[(0, 0), (30, 1)])
+    up = states(**{flag: [(0, 0), (29.9, 1)]}, gcs_connection_lost=[(0, 1)])
+    log = MadeLog({"vehicle_status": flown, "failsafe_flags": up}, parameters={name: set_to(20.0)})
+    named = [one.parameters for one in examine(Px4Flight(log)).findings if one.parameters]
+    assert named == ([(name,)] if name else [])
 
 
 def test_a_flight_that_never_had_a_radio_has_lost_none() -> None:

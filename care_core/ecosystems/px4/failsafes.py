@@ -10,13 +10,17 @@ from care_core.logs.base import Wanted
 REASONS: Mapping[str, tuple[str, ...]] = {
     "battery": ("battery_warning", "battery_unhealthy", "battery_low_remaining_time"),
     "geofence": ("geofence_breached",),
-    "position": ("local_position_invalid", "global_position_invalid", "local_velocity_invalid"),
+    "position": (
+        "local_position_invalid", "global_position_invalid", "local_velocity_invalid",
+        "local_position_accuracy_low", "position_accuracy_low",
+    ),
     "attitude": ("attitude_invalid", "angular_velocity_invalid", "fd_critical_failure"),
     "motor": ("fd_motor_failure", "fd_esc_arming_failure", "fd_imbalanced_prop"),
     "link": ("manual_control_signal_lost", "gcs_connection_lost", "offboard_control_signal_lost"),
     "mission": ("mission_failure",),
     "wind": ("wind_limit_exceeded",),
-}
+    "flight time": ("flight_time_limit_exceeded",),
+}  # fmt: skip
 _NEEDED = {
     "local_position_invalid": ("mode_req_local_position", "mode_req_local_position_relaxed"),
     "global_position_invalid": ("mode_req_global_position", "mode_req_global_position_relaxed"),
@@ -67,6 +71,11 @@ def matters(flight: Px4Flight, flag: str, t: float) -> bool:
     return not masks or mode is None or any(int(mask) >> int(mode) & 1 for mask in masks)
 
 
+def rose_with(flight: Px4Flight, flag: str, acted_s: float) -> bool:
+    """Whether a flag rose as a failsafe acted."""
+    return any(value > 0 and abs(t - acted_s) < _ROSE_S for t, value in flight.changes(FLAGS, flag))
+
+
 def in_words(flight: Px4Flight, acted_s: float) -> str:
     """The same in a word or two: by the flags that rose with it, else by those that were up; empty where none was, or
     where so many were that none tells."""
@@ -74,8 +83,7 @@ def in_words(flight: Px4Flight, acted_s: float) -> str:
         flag
         for flags in REASONS.values()
         for flag in flags
-        if any(value > 0 and abs(t - acted_s) < _ROSE_S for t, value in flight.changes(FLAGS, flag))
-        and matters(flight, flag, acted_s)
+        if rose_with(flight, flag, acted_s) and matters(flight, flag, acted_s)
     )
     words = [_LINKS.get(flag) or next(about for about, flags in REASONS.items() if flag in flags) for flag in rose]
     told = dict.fromkeys(words or reasons(flight, acted_s))

@@ -8,7 +8,9 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.episodes import Episode, State, episode
 from care_core.ecosystems.px4.flight import FLAGS, STATUS, Px4Flight
+from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted, merge_needs
+from care_core.records import replace
 
 _OLD_FLAGS, _ESTIMATOR = "vehicle_status_flags", "estimator_status_flags"
 
@@ -28,6 +30,7 @@ _BUMPED_P = LIMITS.add(
 )
 _UNAIDED_P = LIMITS.add("probability of a part, no position aid", 0.8, "", f"{_FLIGHTS}: 8 of 9, all of the GPS")
 _UNAIDED_LOST_P = LIMITS.add("probability that a mission fails without it", 0.9, "", f"{_FLIGHTS}: 8 of 9")
+_LINK_P = LIMITS.add("probability of a link whose failsafe acted", 0.95, "", "the firmware's own flag, as it acts")
 
 STATES = (
     State(STATUS, "failsafe", "failsafe"),
@@ -64,6 +67,14 @@ STATES = (
     State(_ESTIMATOR, "fs_bad_acc_clipping", "accelerometers clip", "vibration"),
 )  # fmt: skip
 """msg/VehicleStatus.msg, FailsafeFlags.msg, VehicleStatusFlags.msg (to 1.13) and EstimatorStatusFlags.msg."""
+_ACTIONS = {
+    "rc_signal_lost": "NAV_RCL_ACT",
+    "manual_control_signal_lost": "NAV_RCL_ACT",
+    "data_link_lost": "NAV_DLL_ACT",
+    "gcs_connection_lost": "NAV_DLL_ACT",
+}
+"""What says how the vehicle acts where it loses a link."""
+_AT_ONCE_S = 1.5
 _OF_PARTS = frozenset((
     "battery_unhealthy", "battery_low_remaining_time", "condition_battery_healthy", "global_position_invalid",
 ))  # fmt: skip
@@ -85,7 +96,24 @@ def episodes(flight: Px4Flight) -> Iterator[Episode]:
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
-    yield from filter(None, (found.finding() for found in episodes(flight)))
+    for found in episodes(flight):
+        finding = found.finding()
+        if finding is not None:
+            yield _acted_on(flight, found, finding)
+
+
+def _acted_on(flight: Px4Flight, found: Episode, finding: Finding) -> Finding:
+    """A lost link on which a failsafe acted that broke a mission off: how it is set says so."""
+    action = _ACTIONS.get(found.state.field)
+    near = (found.start_s - _AT_ONCE_S, found.start_s + _AT_ONCE_S)
+    before = [mode for t, mode in flight.modes if t < near[0]]
+    acted = any(value > 0 and near[0] <= t <= near[1] for t, value in flight.changes(STATUS, "failsafe"))
+    if action is None or not acted or not before or way_of("px4", before[-1]) != "mission":
+        return finding
+    value = flight.parameter(action)
+    how = "" if value is None else f"; {action} is {value:g}, which acts on it in a mission"
+    evidence = f"{finding.evidence}{how}"
+    return replace(finding, severity="critical", probability=_LINK_P, evidence=evidence)
 
 
 CHECK = Check("flags", "what the vehicle itself reports as failed, lost or beyond its limits", READS, LIMITS, find)

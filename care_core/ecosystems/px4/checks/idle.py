@@ -13,11 +13,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import NO_MISSION, NOT_BEGUN, Finding
+from care_core.ecosystems.findings import HASTY, NO_MISSION, NOT_BEGUN, Finding
 from care_core.ecosystems.px4.flight import LANDED, MESSAGES, RESULT, SAID_WITHIN_S, Px4Flight
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
+from care_core.records import replace
 
 _THRUST, _OLD_THRUST = "vehicle_thrust_setpoint", "vehicle_attitude_setpoint"
 READS: Wanted = {
@@ -29,6 +30,7 @@ READS: Wanted = {
 }
 _NO_MISSION = re.compile(r"no valid mission available", re.IGNORECASE)
 _GIVEN_UP = re.compile(r"auto preflight disarm", re.IGNORECASE)
+_GIVES_UP_AFTER, _SPOOLS_FOR = "COM_DISARM_PRFLT", "COM_SPOOLUP_TIME"
 LIMITS = Limits()
 _IDLES = LIMITS.add("thrust that is asked for on the ground", 0.1, "", "MPC_THR_MIN is 0.12 as shipped")
 _WAITS_S = LIMITS.add("shortest time armed", 3.0, "s", "a choice: COM_SPOOLUP_TIME is 1 s as shipped, and margin")
@@ -46,13 +48,15 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
 
 def _waited(flight: Px4Flight, span: Span) -> Finding | None:
     """A mission that was last in force, on the ground: without thrust, or so late that the firmware gave up at once."""
+    given_up = any(_GIVEN_UP.search(text) for t, _, text in flight.messages if abs(t - span[1]) < SAID_WITHIN_S)
+    if given_up and (hasty := _hasty(flight, span)) is not None:
+        return hasty
     modes = flight.modes_during(span)
     stays = flight.during(LANDED, "landed", span) is not None and not flight.ever(LANDED, "landed", 0, span)
     if not stays or not modes or way_of("px4", modes[-1]) != "mission" or span[1] - span[0] < _WAITS_S:
         return None
     asked = _most_asked(flight, span)
     begun_s = max(t for t, _ in flight.modes if t <= span[1])
-    given_up = any(_GIVEN_UP.search(text) for t, _, text in flight.messages if abs(t - span[1]) < SAID_WITHIN_S)
     is_late = given_up and begun_s > span[1] - _WAITS_S
     if not is_late and (asked is None or asked >= _IDLES):
         return None
@@ -61,6 +65,20 @@ def _waited(flight: Px4Flight, span: Span) -> Finding | None:
     again = "; the navigator calls the mission finished: upload it again, or start it anew" if done else ""
     evidence = f"armed for {span[1] - span[0]:.0f} s on the ground, at last in mode Mission: {why}{again}"
     return _finding(NOT_BEGUN, span, evidence, f"{LANDED}, {_THRUST}, {RESULT}, {MESSAGES}")
+
+
+def _hasty(flight: Px4Flight, span: Span) -> Finding | None:
+    """The firmware gave up while the motors were still to spool up, by how it was set."""
+    waits_s, spools_s = flight.parameter(_GIVES_UP_AFTER), flight.parameter(_SPOOLS_FOR)
+    if waits_s is None or spools_s is None or not 0 < waits_s <= spools_s:
+        return None
+    named = [name for name in (_SPOOLS_FOR, _GIVES_UP_AFTER) if flight.off_default(name) is not None]
+    evidence = (
+        f"armed for {span[1] - span[0]:.1f} s: {_SPOOLS_FOR} is {spools_s:g} s, and {_GIVES_UP_AFTER} {waits_s:g} s, "
+        "after which the firmware disarms what has not taken off"
+    )
+    found = _finding(HASTY, span, evidence, f"{MESSAGES}, parameters")
+    return replace(found, suspect="parameter", parameters=tuple(named) or (_SPOOLS_FOR, _GIVES_UP_AFTER))
 
 
 def _refused(flight: Px4Flight, span: Span) -> Finding | None:
