@@ -17,12 +17,17 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.px4.flight import MESSAGES, Px4Flight
 from care_core.ecosystems.vehicles.settings import code, number
 from care_core.logs.base import Wanted
+from care_core.numbers import Floats
 from care_core.run import Setting, shown
 from care_core.text import listed
 
 READS: Wanted = {MESSAGES: ("message",)}
 LIMITS = Limits()
 _OFF_CENTRE = LIMITS.add("lift off the middle, as a share of the arms", 0.3, "", "a choice: a frame is nearly even")
+_ODD = LIMITS.add(
+    "ratio of one rotor's lift to each of the others'", 1.5, "", "a choice: frames have alike rotors, or pairs"
+)
+_ALIKE = LIMITS.add("spread of the others' lift", 0.1, "", "a choice: alike")
 _TILTED = LIMITS.add("tilt of one rotor alone", 0.1, "", "a choice: 6 degrees; frames tilt all of theirs")
 _SURE_P = LIMITS.add("probability of the parameter", 0.95, "", "no frame is built so")
 _MULTIROTOR = 0
@@ -61,6 +66,8 @@ def _unbalanced(rotors: Rotors) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield "a rotor that lifts nothing, or downwards", ("CT",)
     elif np.hypot(np.sum(lift * x), np.sum(lift * y)) / np.sum(lift) > _OFF_CENTRE * arm:
         yield f"lift off the middle by more than {_OFF_CENTRE:g} of the arms of {arm:.2g} m", ("PX", "PY", "CT")
+    elif (share := _odd_one(lift)) is not None:
+        yield f"one rotor that lifts {share:.2g} times as much as each of the others", ("CT",)
     if (
         len(turn) % 2 == 0
         and np.allclose(np.abs(turn), np.abs(turn[0]), rtol=0.01)
@@ -71,6 +78,14 @@ def _unbalanced(rotors: Rotors) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield "rotors that lift up and down", ("AZ",)
     if sum(max(abs(a), abs(b)) > _TILTED for a, b in zip(rotors["AX"], rotors["AY"], strict=True)) == 1:
         yield "one rotor that is tilted", ("AX", "AY")
+
+
+def _odd_one(lift: Floats) -> float | None:
+    """How many times what each of the others lifts one rotor alone does; None where none stands out."""
+    shares = lift / np.median(lift)
+    odd = (shares > _ODD) | (shares < 1 / _ODD)
+    rest = shares[~odd]
+    return float(shares[odd][0]) if odd.sum() == 1 and np.ptp(rest) < _ALIKE else None
 
 
 def _without_frame(flight: Px4Flight) -> Iterator[Finding]:
