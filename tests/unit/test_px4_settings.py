@@ -55,6 +55,7 @@ def test_a_frame_that_balances_says_nothing() -> None:
         ("CA_ROTOR2_KM", 0.05, "3 rotors that turn one way and 1 the other"),
         ("CA_ROTOR0_PX", -1.0, "lift off the middle"),
         ("CA_ROTOR1_CT", -6.5, "lifts nothing, or downwards"),
+        ("CA_ROTOR2_CT", 1.1, "one rotor that lifts 0.17 times"),
         ("CA_ROTOR3_AZ", 1.0, "lift up and down"),
         ("CA_ROTOR0_AY", 0.5, "one rotor that is tilted"),
     ],
