@@ -84,6 +84,12 @@ def test_a_px4_parameter_is_held_against_its_airframe_and_known_by_its_part() ->
     assert (option.unit, option.range) == ("m", None)
 
 
+def test_a_rotor_that_the_vehicle_has_none_of_is_no_suspect() -> None:
+    driven = {**setting("CA_ROTOR_COUNT", 4, 0), **setting("CA_ROTOR3_AX", 0.5, 0), **setting("CA_ROTOR4_AX", 0.5, 0)}
+    assert "CA_ROTOR4_AX" not in [one.name for one in off_parameters(driven, PX4_QUAD, (), None)]
+    assert "CA_ROTOR3_AX" in [one.name for one in off_parameters(driven, PX4_QUAD, (), None)]
+
+
 def test_a_parameter_at_its_default_is_not_off() -> None:
     assert not list(off_parameters(setting("RTL_LOIT_TIME", 5000, 5000), COPTER, (), None))
 

@@ -131,6 +131,16 @@ def test_a_limit_at_which_a_failsafe_acted_names_its_parameter(flag: str, name: 
     assert named == ([(name,)] if name else [])
 
 
+@pytest.mark.parametrize(("mean_a", "is_told"), [(250.0, True), (30.0, False)])
+def test_a_battery_that_was_reckoned_with_a_current_that_it_never_drew(mean_a: float, is_told: bool) -> None:
+    flown = states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 3), (30, 5)], failsafe=[(0, 0), (30, 1)])
+    battery = states(voltage_v=[(0, 16.4)], current_a=[(0, 0.5), (12, 18.0)], remaining=[(0, 0.95)], warning=[(0, 0)])
+    low = states(battery_low_remaining_time=[(0, 0), (30, 1)])
+    topics = {"vehicle_status": flown, "battery_status": battery, "failsafe_flags": low}
+    found = examine(Px4Flight(MadeLog(topics, parameters={"BAT_AVRG_CURRENT": set_to(mean_a)}))).findings
+    assert [one.parameters for one in found if one.parameters] == ([("BAT_AVRG_CURRENT",)] if is_told else [])
+
+
 def test_a_flight_that_never_had_a_radio_has_lost_none() -> None:
     flown = states(arming_state=[(0, 2), (40, 1)], nav_state=[(0, 17)])
     health = examine(

@@ -17,6 +17,8 @@ from care_core.run import Setting
 TABLED = (4, 3), (4, 6)
 """Releases whose defaults are about those of the table, where a log holds none."""
 _AT_EVERY_START = re.compile(r"INS\d?_GYR\d?_?OFF.*|COMPASS_PRIO\d_ID|.*_DEV_?ID\d?|BARO\d_GND_PRESS|STAT_.*")
+_COUNTED = re.compile(r"(CA_ROTOR|CA_SV_CS|CA_SV_TL)(\d+)_")
+"""Parts of PX4's control allocation, numbered from 0; CA_ROTOR_COUNT and the like tell how many there are."""
 UNFELT = 1e-5
 """What differs from 0 by less only marks a calibration as done (SENS_BOARD_X_OFF of PX4's simulated airframes)."""
 
@@ -56,6 +58,8 @@ def off_parameters(
     for name, setting in settings.items():
         if name in modelled or _is_nobodys(name) or not isinstance(setting.value, (int, float)):
             continue
+        if _is_beyond_count(name, settings):
+            continue
         default = _default(setting, vehicle)
         before = None if good is None or name not in good else good[name].value
         last_good = float(before) if isinstance(before, (int, float)) else None
@@ -80,6 +84,15 @@ def off_parameters(
 
 def _is_default(default: float | None, value: float) -> bool:
     return same_value(default, value) or (default == 0 and abs(value) < UNFELT)
+
+
+def _is_beyond_count(name: str, settings: Mapping[str, Setting]) -> bool:
+    """Whether it describes a rotor or a surface that the vehicle has none of: nothing reads it."""
+    part = _COUNTED.match(name)
+    count = None if part is None else settings.get(f"{part[1]}_COUNT")
+    return (
+        part is not None and count is not None and isinstance(count.value, (int, float)) and int(part[2]) >= count.value
+    )
 
 
 def _is_nobodys(name: str) -> bool:

@@ -10,14 +10,14 @@ import numpy as np
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import UNCHARGED, Finding
 from care_core.ecosystems.lithium import HARMED_V, HIGHEST_V, LOW_V, NO_CELL_V
-from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.px4.flight import FLAGS, Px4Flight
 from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles.settings import code
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
 
 _TOPIC = "battery_status"
-READS: Wanted = {_TOPIC: ("voltage_v", "current_a", "remaining", "warning")}
+READS: Wanted = {_TOPIC: ("voltage_v", "current_a", "remaining", "warning"), FLAGS: ("battery_low_remaining_time",)}
 LIMITS = Limits()
 _CHARGED = LIMITS.add("charge at arming", 0.5, "of the battery", "a choice: a mission is planned with a full one")
 _DRAINED = LIMITS.add(
@@ -49,6 +49,8 @@ _HALF_V = LIMITS.add(
 )
 _LOADED_V = LIMITS.add("voltage of a cell under load that is sound", 3.5, "V", "BAT1_V_EMPTY as shipped before 1.14")
 _TOLD_LOW_P = LIMITS.add("probability that its charge was told too low", 0.9, "", "its voltage at rest says so")
+_NEVER_DRAWN = LIMITS.add("ratio of a mean current to the most that was drawn", 3.0, "", "a choice: no gust draws that")
+_MEAN_A, _NOT_LAST = "BAT_AVRG_CURRENT", "battery_low_remaining_time"
 _CRITICAL, _EMERGENCY = 2, 3
 """battery_status.warning."""
 _EMPTY_AT = ("BAT1_V_EMPTY", "BAT_V_EMPTY")
@@ -61,7 +63,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     table = flight.table(_TOPIC, "voltage_v", "current_a", "remaining")
     if table is None:
         return
-    wrong = next(iter((*_other_cells(flight, table), *_told_low(flight))), None)
+    wrong = next(iter((*_other_cells(flight, table), *_told_low(flight), *_reckoned(flight, table))), None)
     yield from (wrong,) if wrong is not None else _ran_down(flight)
     if not flight.arming:
         return
@@ -159,6 +161,28 @@ def _told_low(flight: Px4Flight) -> Iterator[Finding]:
         probability=_TOLD_LOW_P,
         parameters=(name,) if name else (),
     )
+
+
+def _reckoned(flight: Px4Flight, table: Table) -> Iterator[Finding]:
+    """A battery that was not to last, by a mean current that was set and was never drawn."""
+    setting = flight.off_default(_MEAN_A)
+    for span in flight.armed if setting is not None else ():
+        short_s = flight.first_s(FLAGS, _NOT_LAST, 1, span)
+        set_a, drawn_a = flight.parameter(_MEAN_A), float(np.max(table.between(*span)["current_a"], initial=_LEAST_A))
+        if short_s is not None and set_a is not None and set_a > _NEVER_DRAWN * drawn_a:
+            yield Finding(
+                kind="battery",
+                title="how long its battery lasts is reckoned with a current that it never drew",
+                onset_s=short_s,
+                end_s=span[1],
+                severity="critical",
+                evidence=f"{_MEAN_A} is {set_a:g} A, and the most that was drawn {drawn_a:.0f} A",
+                source=f"{FLAGS}.{_NOT_LAST}, {_TOPIC}.current_a",
+                suspect="parameter",
+                probability=_TOLD_LOW_P,
+                parameters=(_MEAN_A,),
+            )
+            return
 
 
 def _ran_down(flight: Px4Flight) -> Iterator[Finding]:
