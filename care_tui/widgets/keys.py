@@ -27,7 +27,7 @@ class Keys(Static):
         self._label_of = label_of
         self._keys = Content()
         self._is_asked = False
-        """Whether the keys are to be told once all that was set off is done: several signals come of one key."""
+        """Whether the keys are to be told already: several signals come of one key."""
 
     def on_mount(self) -> None:
         self.screen.bindings_updated_signal.subscribe(self, self._ask)
@@ -35,7 +35,8 @@ class Keys(Static):
     def _ask(self, _screen: Screen[object]) -> None:
         if not self._is_asked:
             self._is_asked = True
-            self.call_after_refresh(self._tell_asked)
+            # Not after the refresh: that is the business of the screen in front, and is forgotten where it closes first.
+            self.call_later(self._tell_asked)
 
     def _tell_asked(self) -> None:
         self._is_asked = False

@@ -192,6 +192,16 @@ async def test_a_cause_set_aside_leaves_the_fix_and_its_reason_is_in_the_report(
         assert text(app) == "report: yaml\n  LAND_SPEED: 50", "a second d undoes all that the first did"
 
 
+async def test_the_keys_are_told_after_a_dialog_that_closed_at_once(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "2")
+        await pilot.press("f1")
+        await app.pop_screen()
+        await settle(pilot, "3", "d", *"as agreed", "enter")
+        assert "d Take back" in str(app.screen.query_one(Keys).content)
+
+
 async def test_a_cause_that_was_in_no_fix_comes_back_without_being_ticked(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
