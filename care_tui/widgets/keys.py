@@ -35,7 +35,7 @@ class Keys(Static):
     def _ask(self, _screen: Screen[object]) -> None:
         if not self._is_asked:
             self._is_asked = True
-            # Not after the refresh: that is the business of the screen in front, and is forgotten where it closes first.
+            # Not after the refresh: the screen in front sees to that, and forgets it where it closes first.
             self.call_later(self._tell_asked)
 
     def _tell_asked(self) -> None:

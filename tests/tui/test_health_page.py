@@ -119,7 +119,7 @@ async def test_where_no_profile_fits_what_explains_a_failure_is_ranked_all_the_s
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
         assert "by what the log shows alone" in title(app)
-        assert items(app).splitlines()[0].split()[:2] == ["80", "%"]
+        assert items(app).split()[0] == "80%"
         assert "motor 2 lost thrust" in items(app).splitlines()[0]
         assert "output 1950 us" in text(app)
         await settle(pilot, "j", "d", "w", "3", "enter")
@@ -168,7 +168,7 @@ async def test_parts_parameters_and_chance_compete_in_one_ranking(make_app: Make
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
         lines = items(app).splitlines()
-        assert [line.split()[0] for line in lines[:3]] == ["90", "6", "4"]
+        assert [line.split()[0] for line in lines[:3]] == ["90%", "6%", "4%"]
         assert "motor 2 lost thrust" in lines[0]
         assert "from 91.3 s" in lines[0]
         assert "LAND_SPEED  16 → 50 cm/s" in lines[1]

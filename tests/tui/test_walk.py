@@ -348,7 +348,7 @@ async def test_a_value_of_ones_own_has_odds_of_its_own_also_beside_other_changes
         ticked = walk(app).session.basket.ticked
         assert len(ticked) == 2
         assert set(ticked.items()) <= set(walk(app).session.alone())
-        assert walk(app).page.choices.plain.count(" %") == 2
+        assert walk(app).page.choices.plain.count("%") == 2
 
 
 async def test_a_wide_fix_draws_the_odds_over_the_values_of_a_parameter_and_asks_once(make_app: MakeApp) -> None:
