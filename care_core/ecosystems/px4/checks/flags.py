@@ -105,15 +105,16 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
 def _acted_on(flight: Px4Flight, found: Episode, finding: Finding) -> Finding:
     """A lost link on which a failsafe acted that broke a mission off: how it is set says so."""
     action = _ACTIONS.get(found.state.field)
+    if action is None:
+        return finding
     near = (found.start_s - _AT_ONCE_S, found.start_s + _AT_ONCE_S)
     before = [mode for t, mode in flight.modes if t < near[0]]
     acted = any(value > 0 and near[0] <= t <= near[1] for t, value in flight.changes(STATUS, "failsafe"))
-    if action is None or not acted or not before or way_of("px4", before[-1]) != "mission":
+    if not acted or not before or way_of("px4", before[-1]) != "mission":
         return finding
     value = flight.parameter(action)
     how = "" if value is None else f"; {action} is {value:g}, which acts on it in a mission"
-    evidence = f"{finding.evidence}{how}"
-    return replace(finding, severity="critical", probability=_LINK_P, evidence=evidence)
+    return replace(finding, severity="critical", probability=_LINK_P, evidence=f"{finding.evidence}{how}")
 
 
 CHECK = Check("flags", "what the vehicle itself reports as failed, lost or beyond its limits", READS, LIMITS, find)

@@ -60,5 +60,5 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
 
 
 CHECK = Check(
-    "limits", "a limit of time, wind or accuracy at which a failsafe broke the flight off", READS, LIMITS, find
+    "flight limits", "a limit of time, wind or accuracy at which a failsafe broke the flight off", READS, LIMITS, find
 )
