@@ -426,7 +426,7 @@ def fault_sentence(objectives: Sequence[JudgedObjective], findings: Sequence[See
     found = [_with_time(one) for one in worst if not (is_refused and one.kind == "prearm")]
     if not found and any(sentence.endswith((MISSION_FAILED, " not met")) for sentence in broken):
         found = [_with_time(one) for one in findings if one.severity == "warning"][:1]
-    if objectives and all(one.status == "ok" for one in objectives):
+    if not _ASKED_OF_RUN.keys() >= {one.name for one in objectives} and all(one.status == "ok" for one in objectives):
         found.append("every objective was met")
     first, *others = [clause for sentence in broken for clause in sentence.split("; ")] or found[:1]
     told = {log_time(one.onset_s) for one in worst if one.kind in ("attitude", "crash")}

@@ -61,3 +61,12 @@ def test_the_odds_of_a_refused_vehicle_count_every_limit_of_the_mission_before_i
     as_advised, crawling = asked.query.probability([config, {**config, "WPNAV_SPEED": 8.0}])
     assert as_advised > 0.8
     assert crawling < 0.1
+
+
+def test_a_dive_whose_log_begins_once_it_is_armed_is_judged() -> None:
+    """As submarines write it that log nothing while disarmed: no record of the arming is in it."""
+    diagnosis = care_core.triage(DATA / "ardusub_dive.BIN").diagnosis
+    assert diagnosis.profile.name == "ardusub"
+    assert {result.variable.name: result.status for result in diagnosis.objectives} == dict.fromkeys(
+        ("mission_success", "mission_time", "energy", "path_error_max", "depth_error"), "ok"
+    )

@@ -281,7 +281,7 @@ def test_a_mission_that_lands_on_its_way_ends_where_it_lands_last() -> None:
     assert value("px4_path_error", flight) == asked
 
 
-def leaning(*degrees: tuple[float, float]) -> list[str]:
+def leaning(*degrees: tuple[float, float], height_m: float = 10.0) -> list[str]:
     """Findings of the attitude of a hover that was to be level, and leant so far from given times on."""
     half = [(t, np.radians(lean) / 2) for t, lean in ((0.0, 0.0), *degrees)]
     roll: dict[str, list[tuple[float, float]]] = {
@@ -294,7 +294,7 @@ def leaning(*degrees: tuple[float, float]) -> list[str]:
         vehicle_status=states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 2)], failsafe=[(0, 0)],
                               vehicle_type=[(0, 1)]),
         vehicle_land_detected=states(landed=[(0, 1), (12, 0), (48, 1)]),
-        vehicle_local_position=states(z=[(0, 0.0), (13, -10.0), (47, 0.0)], vz=[(0, 0.0)]),
+        vehicle_local_position=states(z=[(0, 0.0), (13, -height_m), (47, 0.0)], vz=[(0, 0.0)]),
         vehicle_attitude=states(**roll),
         vehicle_attitude_setpoint=states(**level),
     )  # fmt: skip
@@ -307,6 +307,14 @@ def test_an_attitude_that_left_its_demand_and_came_back_is_told() -> None:
     assert leaning((25.0, 110.0), (26.2, 0.0)) == ["it tumbled in the air and caught itself"]
     assert leaning((25.0, 40.0), (25.4, 0.0), (40.0, 40.0), (40.4, 0.0)) == []  # flicks of a stick
     assert leaning((25.0, 90.0)) == ["control was lost"]
+
+
+def test_what_leans_over_as_it_is_to_lift_and_stays_so_is_told() -> None:
+    over = ["it leaned over on the ground and did not lift"]
+    assert leaning((14.0, 25.0), height_m=0.2) == over
+    assert leaning((14.0, 25.0), (30.0, 0.0), height_m=0.2) == []  # it stood up again
+    assert leaning((14.0, 25.0), height_m=3.0) == []  # it flew, and 25 degrees off are no loss of control
+    assert leaning((48.0, 25.0), height_m=0.2) == []  # as it is switched off
 
 
 @pytest.mark.parametrize(

@@ -493,6 +493,50 @@ def test_a_battery_that_runs_down_in_the_air_is_told_and_one_with_fewer_cells_th
     assert flown(17.4, 16.8, 0) == []  # cells of high voltage are full at 4.35 V
 
 
+def kept_for_its_charge(cells: float, empty_v: float, full_v: float) -> list[tuple[str, str, tuple[str, ...]]]:
+    """What is found of a vehicle that shuts itself down before anybody armed it, for a charge of nothing."""
+    values = {"BAT1_N_CELLS": (cells, 0.0), "BAT1_V_EMPTY": (empty_v, 3.6), "BAT1_V_CHARGED": (full_v, 4.05)}
+    parameters = {name: (Setting(name, value, "ulog", default),) for name, (value, default) in values.items()}
+    log = MadeLog({
+        "vehicle_status": states(arming_state=[(0, 1)], nav_state=[(0, 4)]),
+        "battery_status": Table(np.array([0.6, 1.2]), {
+            "voltage_v": np.array([16.6, 16.6]), "current_a": np.array([0.4, 0.4]), "remaining": np.zeros(2),
+        }),
+        "logged_messages": words((1.4, "WARNING", "Arming check: Low battery level")),
+    }, parameters=parameters)  # fmt: skip
+    findings = examine(Px4Flight(log)).findings
+    return [(one.title, one.severity, one.parameters) for one in findings if one.kind == "battery"]
+
+
+def test_a_sound_battery_that_keeps_it_from_arming_is_told_with_what_was_set() -> None:
+    title = "the battery is told to be empty, and is not"
+    assert kept_for_its_charge(4, 3.6, 4.05) == []  # it says no more than that it is low
+    assert kept_for_its_charge(4, 7.5, 4.05) == [(title, "critical", ("BAT1_V_EMPTY",))]
+    assert kept_for_its_charge(4, 3.6, 9.0) == [(title, "critical", ("BAT1_V_CHARGED",))]
+    assert kept_for_its_charge(5, 7.5, 4.05) == []  # 3.3 V a cell is empty indeed
+    fewer = "the battery has fewer cells than are set"
+    assert kept_for_its_charge(14, 3.6, 4.05) == [(fewer, "critical", ("BAT1_N_CELLS",))]
+
+
+@pytest.mark.parametrize(
+    ("limit_deg", "leans_deg", "named"), [(13.0, 24.0, ("FD_FAIL_P",)), (60.0, 24.0, ()), (13.0, 80.0, ())]
+)
+def test_a_failure_detector_that_acts_on_what_it_may_lean(
+    limit_deg: float, leans_deg: float, named: tuple[str, ...]
+) -> None:
+    half = np.radians(leans_deg) / 2
+    parameters = {"FD_FAIL_R": set_to(60.0), "FD_FAIL_P": set_to(limit_deg), "MPC_TILTMAX_AIR": set_to(45.0)}
+    log = MadeLog({
+        "vehicle_status": FLOWN,
+        "failsafe_flags": states(fd_critical_failure=[(0, 0), (30, 1), (31, 0)]),
+        "vehicle_attitude": states(**{"q[0]": [(0, 1.0), (30, float(np.cos(half))), (31, 1.0)],
+                                      "q[1]": [(0, 0.0)],
+                                      "q[2]": [(0, 0.0), (30, float(np.sin(half))), (31, 0.0)], "q[3]": [(0, 0.0)]}),
+    }, parameters=parameters)  # fmt: skip
+    (finding,) = [one for one in examine(Px4Flight(log)).findings if "failure detector" in one.title]
+    assert finding.parameters == named
+
+
 @pytest.mark.parametrize(
     ("least_v", "after_v", "ampere", "title"),
     [

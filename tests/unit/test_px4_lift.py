@@ -17,15 +17,32 @@ ARMED = (10.0, 50.0)
 
 
 def found(
-    lift: float, sinks: float, wanted: float, lasts_s: float, baro: float = 1.0, **parameters: float
+    lift: float,
+    sinks: float,
+    wanted: float,
+    lasts_s: float,
+    baro: float = 1.0,
+    leans_deg: float = 0.0,
+    **parameters: float,
 ) -> list[Finding]:
-    """Findings of a flight that hovers, and from 20 s on, for a time, is asked for a lift and sinks so fast (m/s)."""
+    """Findings of a flight that hovers, and from 20 s on, for a time, is asked for a lift and sinks so fast (m/s), so
+    many degrees off its demand all the time."""
+    half = np.radians(leans_deg) / 2
+    lean = {
+        "q[0]": [(0, float(np.cos(half)))],
+        "q[1]": [(0, float(np.sin(half)))],
+        "q[2]": [(0, 0.0)],
+        "q[3]": [(0, 0.0)],
+    }
+    level = {"q_d[0]": [(0, 1.0)], **{f"q_d[{n}]": [(0, 0.0)] for n in (1, 2, 3)}}
     shipped = {"MPC_THR_MIN": 0.12, "MPC_THR_MAX": 1.0}
     held = {name: (Setting(name, value, "ulog", shipped[name]),) for name, value in parameters.items()}
     end = 20.0 + lasts_s
     steps = [(0.0, 0.0), *((20.0 + 0.1 * n, sinks * 0.1 * n) for n in range(int(10 * lasts_s)))]
     log = MadeLog({
         "vehicle_status": FLOWN,
+        "vehicle_attitude": states(**lean),
+        "vehicle_attitude_setpoint": states(**level),
         "vehicle_local_position": states(z=[(0, 0.0), *((t, -5.0 + z) for t, z in steps[1:])],
                                          vz=[(0, 0.0), (20, sinks), (end, 0.0)]),
         "vehicle_local_position_setpoint": states(vz=[(0, 0.0), (20, wanted), (end, 0.0)]),
@@ -65,6 +82,11 @@ def test_an_end_of_the_thrust_that_somebody_set_is_named(
     assert one.evidence.endswith(f"{name} is {value:g} (default {default:g})")
     (near,) = found(0.14, -1.5, 1.8, 8.0, MPC_THR_MIN=0.14)
     assert near.parameters == ()
+
+
+def test_what_leans_off_its_demand_gives_its_thrust_for_that() -> None:
+    assert [one.title for one in found(1.0, -0.2, -1.5, 8.0, leans_deg=10.0)] == ["too little thrust"]
+    assert found(1.0, -0.2, -1.5, 8.0, leans_deg=20.0) == []
 
 
 def test_a_climb_of_the_estimate_alone_is_none() -> None:

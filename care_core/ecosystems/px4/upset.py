@@ -23,11 +23,11 @@ LEFT_DEG = LIMITS.add("thrust direction off its demand", 30.0, "deg", "ArduCopte
 _TIPPED_DEG = LIMITS.add(
     "lean where no demand is recorded", 60.0, "deg", "FD_FAIL_R and FD_FAIL_P as shipped; MPC_TILTMAX_AIR is 45"
 )
-_HELD_DEG = LIMITS.add("thrust direction that is held", 15.0, "deg", "a choice: half of the first")
+HELD_DEG = LIMITS.add("thrust direction that is held", 15.0, "deg", "a choice: half of the first")
 _BACK_S = LIMITS.add("time held after which it was back", 2.0, "s", "a choice: a gust")
 _CAUGHT_S = LIMITS.add("time held before the ground after which it was back", 1.0, "s", "a choice: a fall is short")
 _LASTS_S = LIMITS.add("shortest time off its demand", 0.2, "s", "a choice: a step of the demand is over sooner")
-_ALOFT_M = LIMITS.add("height in the air", 1.0, "m", "a choice: below, a landing leg may tip it")
+ALOFT_M = LIMITS.add("height in the air", 1.0, "m", "a choice: below, a landing leg may tip it")
 _HIT_MS = LIMITS.add("descent into the ground", 3.0, "m/s", "a fall from half a metre; MPC_LAND_SPEED is 0.7")
 _FALLS_S = LIMITS.add("time over which it is taken", 0.5, "s", "a choice: what tumbles falls unsteadily")
 _SHOCK = LIMITS.add("blow", 30.0, "m/s^2", "three times gravity is no flight")
@@ -183,7 +183,7 @@ def is_aloft(flight: Px4Flight, at: float) -> bool:
         any(start < at <= end for start, end in flight.armed)
         and flight.last(STATUS, "vehicle_type", at) in (ROTARY, None)
         and flight.last(LANDED, "landed", at - 2.0) in (0, None)
-        and (height is None or height > _ALOFT_M)
+        and (height is None or height > ALOFT_M)
         and mode != [_ACRO]
     )
 
@@ -191,6 +191,6 @@ def is_aloft(flight: Px4Flight, at: float) -> bool:
 def _stays(flight: Px4Flight, lean: attitude.Lean, since: float, hit_s: float) -> bool:
     """Whether it was not back within limits after a time, while armed and before it hit the ground."""
     until = min(next((end for start, end in flight.armed if start <= since <= end), since), hit_s)
-    held: Bools = (lean.error_deg < _HELD_DEG) & (lean.t > since) & (lean.t <= until)
+    held: Bools = (lean.error_deg < HELD_DEG) & (lean.t > since) & (lean.t <= until)
     enough_s = _BACK_S if hit_s == math.inf else _CAUGHT_S
     return not any(end - start > enough_s for start, end in runs(lean.t, held))

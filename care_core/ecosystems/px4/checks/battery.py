@@ -15,6 +15,7 @@ from care_core.ecosystems.spans import Span
 from care_core.ecosystems.vehicles.settings import code
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
+from care_core.text import listed
 
 _TOPIC = "battery_status"
 READS: Wanted = {_TOPIC: ("voltage_v", "current_a", "remaining", "warning"), FLAGS: ("battery_low_remaining_time",)}
@@ -51,19 +52,28 @@ _LOADED_V = LIMITS.add("voltage of a cell under load that is sound", 3.5, "V", "
 _TOLD_LOW_P = LIMITS.add("probability that its charge was told too low", 0.9, "", "its voltage at rest says so")
 _NEVER_DRAWN = LIMITS.add("ratio of a mean current to the most that was drawn", 3.0, "", "a choice: no gust draws that")
 _MEAN_A, _NOT_LAST = "BAT_AVRG_CURRENT", "battery_low_remaining_time"
+_EMPTY = "low battery"
+"""What a complaint says of it."""
 _CRITICAL, _EMERGENCY = 2, 3
 """battery_status.warning."""
-_EMPTY_AT = ("BAT1_V_EMPTY", "BAT_V_EMPTY")
+_EMPTY_AT, _FULL_AT = ("BAT1_V_EMPTY", "BAT_V_EMPTY"), ("BAT1_V_CHARGED", "BAT_V_CHARGED")
 _CELLS_SET = ("BAT1_N_CELLS", "BAT_N_CELLS")
-_FEWEST, _MOST = 3, 17
-"""Records that tell of rest, and one cell more than BAT1_N_CELLS may be."""
+_FEWEST, _FEWEST_AT_REST, _MOST = 3, 2, 17
+"""Records that tell of a load, and of a voltage at rest (a vehicle that shuts itself down leaves no more), and one cell
+more than BAT1_N_CELLS may be."""
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
     table = flight.table(_TOPIC, "voltage_v", "current_a", "remaining")
     if table is None:
         return
-    wrong = next(iter((*_other_cells(flight, table), *_told_low(flight), *_reckoned(flight, table))), None)
+    causes = (
+        *_other_cells(flight, table),
+        *_no_levels(flight, table),
+        *_told_low(flight),
+        *_reckoned(flight, table),
+    )
+    wrong = next(iter(causes), None)
     yield from (wrong,) if wrong is not None else _ran_down(flight)
     if not flight.arming:
         return
@@ -86,7 +96,7 @@ def _other_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
     """By its voltage at rest, which no pack of so many cells has that is still flown, or none at all."""
     name, cells = _cells_set(flight)
     rest = _at_rest(table)
-    if not cells or len(rest) < _FEWEST:
+    if not cells or len(rest) < _FEWEST_AT_REST:
         return
     volts = float(median(rest["voltage_v"]))
     fits = [n for n in range(1, _MOST) if _PER_CELL[0] <= volts / n <= _PER_CELL[1]]
@@ -100,20 +110,21 @@ def _other_cells(flight: Px4Flight, table: Table) -> Iterator[Finding]:
         )
     else:
         return
+    is_held = wanted < cells and _is_held_for_empty(flight)
     yield Finding(
         kind="battery",
         title=f"the battery has {'fewer' if wanted < cells else 'more'} cells than are set",
         onset_s=float(rest.t[0]),
         end_s=float(rest.t[-1]),
-        severity="warning",
+        severity="critical" if is_held else "warning",
         evidence=(
             f"{volts:.1f} V at rest: {volts / cells:.1f} V for each of the {cells} cells that {name} tells, "
             f"{has} failsafes are wrong with it"
         ),
         source=f"{_TOPIC}.voltage_v; {name}",
         suspect="parameter",
-        probability=_CELLS_P,
-        mission_lost=_CELLS_LOSE_P,
+        probability=_TOLD_LOW_P if is_held else _CELLS_P,
+        mission_lost=_LOSES_P if is_held else _CELLS_LOSE_P,
         parameters=(name,),
         wanted=((name, float(wanted)),) if wanted < cells or len(more) == 1 else (),
     )
@@ -128,6 +139,51 @@ def _cells_set(flight: Px4Flight) -> tuple[str, int]:
     """The parameter that tells how many cells there are, and how many it tells; none where no parameter does."""
     told = ((name, code(flight.log.settings(), name)) for name in _CELLS_SET)
     return next(((name, cells) for name, cells in told if cells), ("", 0))
+
+
+def _no_levels(flight: Px4Flight, table: Table) -> Iterator[Finding]:
+    """By the voltages of an empty and a full cell, between which no cell has its charge, where the vehicle holds a
+    sound battery for empty with them."""
+    (_, cells), rest = _cells_set(flight), _at_rest(table)
+    if not cells or not _is_held_for_empty(flight) or len(rest) < _FEWEST_AT_REST:
+        return
+    volts = float(median(rest["voltage_v"])) / cells
+    (empty, empty_v), (full, full_v) = (_level(flight, names) for names in (_EMPTY_AT, _FULL_AT))
+    wrong = [name for name, is_off in ((empty, empty_v > _HALF_V), (full, full_v > NO_CELL_V)) if name and is_off]
+    if wrong and volts > _HALF_V:
+        yield Finding(
+            kind="battery",
+            title="the battery is told to be empty, and is not",
+            onset_s=float(rest.t[0]),
+            end_s=float(rest.t[-1]),
+            severity="critical",
+            evidence=(
+                f"{volts:.2f} V a cell at rest, more than half full; "
+                + listed([f"{one} is {flight.parameter(one):g} V" for one in wrong])
+                + ", which no cell is charged between"
+            ),
+            source=f"{_TOPIC}.voltage_v, remaining; {', '.join(wrong)}",
+            suspect="parameter",
+            probability=_TOLD_LOW_P,
+            mission_lost=_LOSES_P,
+            parameters=tuple(wrong),
+            wanted=tuple(
+                (name, float(one.default))
+                for name in wrong
+                if (one := flight.off_default(name)) is not None and isinstance(one.default, (int, float))
+            ),
+        )
+
+
+def _is_held_for_empty(flight: Px4Flight) -> bool:
+    """Whether a preflight check kept it from arming for its charge."""
+    return not flight.armed and any(_EMPTY in text.lower() for _, text in flight.complaints)
+
+
+def _level(flight: Px4Flight, names: tuple[str, ...]) -> tuple[str, float]:
+    """The parameter of a level of a cell and its voltage; not a number where none tells."""
+    told = ((name, flight.parameter(name)) for name in names)
+    return next(((name, volts) for name, volts in told if volts is not None), ("", np.nan))
 
 
 def _told_low(flight: Px4Flight) -> Iterator[Finding]:

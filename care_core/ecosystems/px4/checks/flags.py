@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
 from care_core.ecosystems.px4.episodes import Episode, State, episode
 from care_core.ecosystems.px4.flight import FLAGS, STATUS, Px4Flight
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted, merge_needs
 from care_core.records import replace
+from care_core.text import listed
 
 _OLD_FLAGS, _ESTIMATOR = "vehicle_status_flags", "estimator_status_flags"
 
@@ -31,6 +35,10 @@ _BUMPED_P = LIMITS.add(
 _UNAIDED_P = LIMITS.add("probability of a part, no position aid", 0.8, "", f"{_FLIGHTS}: 8 of 9, all of the GPS")
 _UNAIDED_LOST_P = LIMITS.add("probability that a mission fails without it", 0.9, "", f"{_FLIGHTS}: 8 of 9")
 _LINK_P = LIMITS.add("probability of a link whose failsafe acted", 0.95, "", "the firmware's own flag, as it acts")
+
+_TIGHT_P = LIMITS.add(
+    "probability of a limit of the failure detector, within what it may lean", 0.95, "", "its limits and its lean"
+)
 
 STATES = (
     State(STATUS, "failsafe", "failsafe"),
@@ -74,6 +82,8 @@ _ACTIONS = {
     "gcs_connection_lost": "NAV_DLL_ACT",
 }
 """What says how the vehicle acts where it loses a link."""
+_DETECTED = ("FD_FAIL_R", "FD_FAIL_P")
+"""Beyond which roll and pitch a vehicle has failed, degrees; 0 for never."""
 _AT_ONCE_S = 1.5
 _OF_PARTS = frozenset((
     "battery_unhealthy", "battery_low_remaining_time", "condition_battery_healthy", "global_position_invalid",
@@ -81,7 +91,7 @@ _OF_PARTS = frozenset((
 """What the vehicle says of a part also where none is connected."""
 _GOOD_WHEN_SET = frozenset(("condition_battery_healthy",))
 
-READS: Wanted = merge_needs({state.topic: (state.field,)} for state in STATES)
+READS: Wanted = merge_needs((ATTITUDE_READS, *({state.topic: (state.field,)} for state in STATES)))
 
 
 def episodes(flight: Px4Flight) -> Iterator[Episode]:
@@ -99,7 +109,7 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     for found in episodes(flight):
         finding = found.finding()
         if finding is not None:
-            yield _acted_on(flight, found, finding)
+            yield _too_tight(flight, found, _acted_on(flight, found, finding))
 
 
 def _acted_on(flight: Px4Flight, found: Episode, finding: Finding) -> Finding:
@@ -115,6 +125,24 @@ def _acted_on(flight: Px4Flight, found: Episode, finding: Finding) -> Finding:
     value = flight.parameter(action)
     how = "" if value is None else f"; {action} is {value:g}, which acts on it in a mission"
     return replace(finding, severity="critical", probability=_LINK_P, evidence=f"{finding.evidence}{how}")
+
+
+def _too_tight(flight: Px4Flight, found: Episode, finding: Finding) -> Finding:
+    """A failure detector that acts on a lean which the vehicle is flown with."""
+    allowed, lean = flight.parameter("MPC_TILTMAX_AIR"), flight.lean
+    if found.state.field != "fd_critical_failure" or allowed is None or lean is None:
+        return finding
+    set_to = {name: value for name in _DETECTED if (value := flight.parameter(name)) is not None}
+    tight = tuple(name for name, value in set_to.items() if 0 < value < allowed)
+    leaned = float(np.nanmax(lean.tilt_deg[(lean.t >= found.start_s) & (lean.t <= found.end_s)], initial=0.0))
+    if not tight or leaned > allowed:
+        return finding
+    limits = listed([f"{name} is {set_to[name]:g} deg" for name in tight])
+    evidence = (
+        f"{finding.evidence}; {limits}, it leaned {leaned:.0f} deg at the most, and MPC_TILTMAX_AIR lets it lean "
+        f"{allowed:g} deg"
+    )
+    return replace(finding, parameters=tight, probability=_TIGHT_P, evidence=evidence)
 
 
 CHECK = Check("flags", "what the vehicle itself reports as failed, lost or beyond its limits", READS, LIMITS, find)

@@ -20,7 +20,7 @@ from care_core.ecosystems.px4.flight import POSITION, Px4Flight
 from care_core.ecosystems.spans import Span, during, runs, within
 from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
-from care_core.numbers import Floats, median, quantile
+from care_core.numbers import Bools, Floats, median, quantile
 from care_core.records import replace
 from care_core.run import shown
 from care_core.text import log_time
@@ -82,8 +82,9 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     flies_off = (lift < least + _NEAR_LEAST) & (wanted - sinks > _OFF_MS) & (sinks < -_RISES_MS)
     all_of_it = _End(t, lacks, sinks, wanted)
     yield from _came_down(flight, all_of_it)
-    lacking = list(_at_its_end(flight, all_of_it, "too little thrust", "all the thrust"))
     drawn_w = drawn_while_lifting(flight)
+    lifting = all_of_it if drawn_w is not None else all_of_it._replace(holds=lacks & ~_leans(flight, t))
+    lacking = list(_at_its_end(flight, lifting, "too little thrust", "all the thrust"))
     if drawn_w is not None:
         yield from _unpowered(flight, lacking or _lifts(flight, t, lift) or _stands(flight, t, lift), drawn_w)
     else:
@@ -93,6 +94,14 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     ):
         lasting = replace(one, severity="critical" if one.end_s - one.onset_s > _LONG_S else "warning")
         yield _set(flight, lasting, "MPC_THR_MIN", 1.0)
+
+
+def _leans(flight: Px4Flight, t: Floats) -> Bools:
+    """Where it leans so far off what it is told that its motors turn it in place of lifting it: the mixer gives up
+    thrust for that, however much is asked for."""
+    if flight.lean is None or not len(flight.lean.t):
+        return np.zeros(len(t), bool)
+    return np.interp(t, flight.lean.t, np.nan_to_num(flight.lean.error_deg)) > _LOOSE_DEG
 
 
 def _set(flight: Px4Flight, one: Finding, end: str, way: float) -> Finding:

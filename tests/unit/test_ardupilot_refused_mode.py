@@ -1,0 +1,61 @@
+"""A mission that was asked for and never began, as the firmware refused Auto."""
+
+from __future__ import annotations
+
+import pytest
+
+from care_core.ecosystems.findings import Finding
+from care_core.run import Setting
+from tests.flights import Made
+
+AUTO, LOITER = 3.0, 5.0
+
+
+class Set(Made):
+    """A flight whose log holds the defaults of what is off."""
+
+    def __init__(self, **off: tuple[float, float]) -> None:
+        super().__init__()
+        self.off = off
+
+    @property
+    def known(self) -> dict[str, tuple[Setting, ...]]:
+        off = {name: (Setting(name, value, "PARM", default),) for name, (value, default) in self.off.items()}
+        return {**super().known, **off}
+
+
+def refused(*times: float, why: str = "requires position", mode: float = AUTO, **off: tuple[float, float]) -> Set:
+    made = Set(**off)
+    made.rows["ERR"] = [(t, {"Subsys": 10.0, "ECode": mode}) for t in times]
+    made.rows["MSG"] += [(t, {"Message": f"Mode change to AUTO failed: {why}"}) for t in times]
+    return made
+
+
+def found(made: Set) -> list[Finding]:
+    return [one for one in made.find() if one.title.startswith("Auto was refused")]
+
+
+def test_auto_that_is_refused_to_the_end_names_what_its_position_goes_by() -> None:
+    (one,) = found(refused(20.0, 30.0, 40.0, EK3_VELNE_M_NSE=(5.0, 0.5)))
+    assert (one.title, one.severity) == ("Auto was refused to the end: requires position", "critical")
+    assert one.parameters == ("EK3_VELNE_M_NSE",)
+    assert one.evidence == "3 refusals, and it was never in Auto; EK3_VELNE_M_NSE is 5 (default 0.5)"
+
+
+@pytest.mark.parametrize(
+    ("times", "why", "severity"),
+    [((20.0,), "requires position", "warning"), ((20.0, 40.0), "no mission", "critical")],
+)
+def test_no_parameter_is_named_where_none_is_off_or_none_is_read(
+    times: tuple[float, ...], why: str, severity: str
+) -> None:
+    off = {} if "position" in why else {"EK3_VELNE_M_NSE": (5.0, 0.5)}
+    (one,) = found(refused(*times, why=why, **off))
+    assert (one.severity, one.parameters) == (severity, ())
+
+
+def test_a_mission_that_was_flown_was_not_refused() -> None:
+    made = refused(20.0, 40.0)
+    made.rows["MODE"].append((60.0, {"ModeNum": AUTO}))
+    assert found(made) == []
+    assert found(refused(20.0, 40.0, mode=LOITER)) == []
