@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pytest
 
 from care_core.ecosystems.findings import Finding
@@ -9,12 +11,15 @@ from care_core.run import Setting
 from tests.flights import Made
 
 AUTO, LOITER = 3.0, 5.0
+Off = Mapping[str, tuple[float, float]]
+NOISY: Off = {"EK3_VELNE_M_NSE": (5.0, 0.5)}
+"""Values and defaults by name."""
 
 
 class Set(Made):
     """A flight whose log holds the defaults of what is off."""
 
-    def __init__(self, **off: tuple[float, float]) -> None:
+    def __init__(self, off: Off) -> None:
         super().__init__()
         self.off = off
 
@@ -24,8 +29,8 @@ class Set(Made):
         return {**super().known, **off}
 
 
-def refused(*times: float, why: str = "requires position", mode: float = AUTO, **off: tuple[float, float]) -> Set:
-    made = Set(**off)
+def refused(*times: float, why: str = "requires position", mode: float = AUTO, off: Off | None = None) -> Set:
+    made = Set(off or {})
     made.rows["ERR"] = [(t, {"Subsys": 10.0, "ECode": mode}) for t in times]
     made.rows["MSG"] += [(t, {"Message": f"Mode change to AUTO failed: {why}"}) for t in times]
     return made
@@ -36,7 +41,7 @@ def found(made: Set) -> list[Finding]:
 
 
 def test_auto_that_is_refused_to_the_end_names_what_its_position_goes_by() -> None:
-    (one,) = found(refused(20.0, 30.0, 40.0, EK3_VELNE_M_NSE=(5.0, 0.5)))
+    (one,) = found(refused(20.0, 30.0, 40.0, off=NOISY))
     assert (one.title, one.severity) == ("Auto was refused to the end: requires position", "critical")
     assert one.parameters == ("EK3_VELNE_M_NSE",)
     assert one.evidence == "3 refusals, and it was never in Auto; EK3_VELNE_M_NSE is 5 (default 0.5)"
@@ -49,8 +54,7 @@ def test_auto_that_is_refused_to_the_end_names_what_its_position_goes_by() -> No
 def test_no_parameter_is_named_where_none_is_off_or_none_is_read(
     times: tuple[float, ...], why: str, severity: str
 ) -> None:
-    off = {} if "position" in why else {"EK3_VELNE_M_NSE": (5.0, 0.5)}
-    (one,) = found(refused(*times, why=why, **off))
+    (one,) = found(refused(*times, why=why, off=None if "position" in why else NOISY))
     assert (one.severity, one.parameters) == (severity, ())
 
 

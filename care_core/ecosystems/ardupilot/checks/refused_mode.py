@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from care_core.configs.driven import same_value
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
@@ -32,7 +31,7 @@ _MOST = 3
 
 def find(flight: Flight) -> Iterator[Finding]:
     """The refusals that no mission followed."""
-    times = [t for t, code in flight.errors(FLIGHT_MODE) if mode_name(flight.kind, code) == _MISSION]
+    times = [t for t, code in flight.errors(FLIGHT_MODE) if mode_name(flight.mode_kind, code) == _MISSION]
     if not times or not flight.armed or any(mode.way == "mission" for mode in flight.modes):
         return
     lasted, why = times[-1] - times[0] >= _LASTS_S, _reason(flight, times[-1])
@@ -62,13 +61,11 @@ def _reason(flight: Flight, t: float) -> str:
 def _off(flight: Flight) -> tuple[tuple[str, str], ...]:
     """The few parameters that an estimate of position goes by and that are off their defaults, with what they are."""
     found = []
-    for name, history in flight.log.settings().items():
-        value, default = history[-1].value, history[-1].default
-        if not isinstance(value, (int, float)) or not isinstance(default, (int, float)) or same_value(default, value):
+    for name in flight.settings:
+        default, meaning = flight.default_left(name), meaning_of(name, flight.kind)
+        if default is None or meaning is None or meaning.role in NO_CAUSE or not meaning.signs & _POSITION:
             continue
-        meaning = meaning_of(name, flight.kind)
-        if meaning is not None and meaning.role not in NO_CAUSE and meaning.signs & _POSITION:
-            found.append((name, f"{name} is {shown(value)} (default {shown(default)})"))
+        found.append((name, f"{name} is {shown(flight.settings[name][0].value)} (default {shown(default)})"))
     return tuple(found) if len(found) <= _MOST else ()
 
 

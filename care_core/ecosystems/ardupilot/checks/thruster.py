@@ -35,6 +35,7 @@ _OVER_S = LIMITS.add("time over which the output is averaged", 5.0, "s", "a choi
 _LASTS_S = LIMITS.add("shortest time of holding", 8.0, "s", "a choice: a current pushes for a while")
 _FAILED_P = LIMITS.add("probability of a thruster", 0.75, "", "a choice: an uneven load or a tether pulls as well")
 _LOST_P = LIMITS.add("probability that it costs the mission", 0.5, "", "5 of 11 such dives")
+_FRAME = "FRAME_CONFIG"
 _NOT_DETECTED = re.compile(r"Failed! Please check Thruster (\d+) and frame setup!")
 """What motor detection says of a thruster that turns the vehicle neither way as its frame would (ArduSub:
 mode_motordetect.cpp)."""
@@ -92,12 +93,19 @@ def _fought(flight: Flight) -> Iterator[Finding]:
         severity="warning",
         evidence=(
             f"{100 * took:.0f}% of its control of the {named} for {seconds_in(spans):.0f} s, with no turn "
-            f"asked for (limit {100 * limit:.0f}%)"
+            f"asked for (limit {100 * limit:.0f}%){_or_frame(flight)}"
         ),
         source="RATE.ROut, YOut; ATT.DesRoll, DesYaw",
         probability=_FAILED_P,
         mission_lost=_LOST_P,
     )
+
+
+def _or_frame(flight: Flight) -> str:
+    """What looks the same: thrusters that are mixed for another frame than the one that is built."""
+    default, frame = flight.default_left(_FRAME), flight.setting(_FRAME)
+    set_to = "" if default is None else f"{_FRAME} is {frame:g} (default {default:g})"
+    return f"; or another frame is set than is built: {set_to}" if set_to else ""
 
 
 CHECK = Check("thruster", "a thruster of a submarine that is weak, off or reversed", READS, LIMITS, find)
