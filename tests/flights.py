@@ -50,6 +50,7 @@ class Made:
         self.rng = np.random.default_rng(seed)
         self.t: Floats = np.arange(0.0, END_S, 1 / rate_hz)
         self.settings = dict(QUAD_X)
+        self.defaults: dict[str, float] = {}
         self.facts = dict(FACTS)
         self.table: dict[str, dict[str, Floats]] = {}
         self.rows: dict[str, list[tuple[float, dict[str, float | str]]]] = {
@@ -79,7 +80,7 @@ class Made:
     @property
     def known(self) -> dict[str, tuple[Setting, ...]]:
         """The parameters as a log holds them."""
-        return {name: (Setting(name, value, "PARM"),) for name, value in self.settings.items()}
+        return {name: (Setting(name, value, "PARM", self.defaults.get(name)),) for name, value in self.settings.items()}
 
     def tables(self) -> dict[str, Table]:
         made: dict[str, Table] = {}

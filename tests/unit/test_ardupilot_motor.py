@@ -179,6 +179,19 @@ def test_a_submarine_that_fights_to_hold_still_lacks_a_thruster(output: str, nam
     assert found.kind == "motor"
 
 
+@pytest.mark.parametrize(("frame", "named"), [(1.0, ()), (2.0, ()), (6.0, ("FRAME_CONFIG",))])
+def test_a_submarine_of_a_rare_frame_that_fights_may_be_of_another(frame: float, named: tuple[str, ...]) -> None:
+    dive = Made()
+    dive.facts = {"firmware": "ArduSub V4.5.0"}
+    dive.rows["MODE"] = [(0.0, {"ModeNum": 2.0})]
+    dive.settings["FRAME_CONFIG"], dive.defaults["FRAME_CONFIG"] = frame, 1.0
+    dive.table["RATE"] = {"ROut": dive.noise(0.02) + 0.5 * dive.after(40.0, 80.0), "YOut": dive.noise(0.02)}
+    dive.table["ATT"]["DesYaw"][:] = 90.0
+    (found,) = [one for one in every_finding(dive.find()) if "thruster" in one.title]
+    assert found.parameters == named
+    assert ("FRAME_CONFIG is" in found.evidence) is (frame != 1.0)
+
+
 def test_motor_detection_that_fails_is_told_by_its_thruster() -> None:
     dive = Made()
     dive.facts = {"firmware": "ArduSub V4.7.0"}

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import pytest
 
 from care_core.ecosystems.findings import Finding
-from care_core.run import Setting
 from tests.flights import Made
 
 AUTO, LOITER = 3.0, 5.0
@@ -16,27 +15,16 @@ NOISY: Off = {"EK3_VELNE_M_NSE": (5.0, 0.5)}
 """Values and defaults by name."""
 
 
-class Set(Made):
-    """A flight whose log holds the defaults of what is off."""
-
-    def __init__(self, off: Off) -> None:
-        super().__init__()
-        self.off = off
-
-    @property
-    def known(self) -> dict[str, tuple[Setting, ...]]:
-        off = {name: (Setting(name, value, "PARM", default),) for name, (value, default) in self.off.items()}
-        return {**super().known, **off}
-
-
-def refused(*times: float, why: str = "requires position", mode: float = AUTO, off: Off | None = None) -> Set:
-    made = Set(off or {})
+def refused(*times: float, why: str = "requires position", mode: float = AUTO, off: Off | None = None) -> Made:
+    made = Made()
+    for name, (value, default) in (off or {}).items():
+        made.settings[name], made.defaults[name] = value, default
     made.rows["ERR"] = [(t, {"Subsys": 10.0, "ECode": mode}) for t in times]
     made.rows["MSG"] += [(t, {"Message": f"Mode change to AUTO failed: {why}"}) for t in times]
     return made
 
 
-def found(made: Set) -> list[Finding]:
+def found(made: Made) -> list[Finding]:
     return [one for one in made.find() if one.title.startswith("Auto was refused")]
 
 

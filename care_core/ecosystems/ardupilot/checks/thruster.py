@@ -19,6 +19,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.spans import during, seconds_in
 from care_core.logs.base import Wanted
 from care_core.numbers import median
+from care_core.records import replace
 
 _MANUAL = 19
 """Mode of a submarine in which the sticks drive the thrusters and nothing is held (ArduSub/mode_manual.cpp)."""
@@ -36,6 +37,8 @@ _LASTS_S = LIMITS.add("shortest time of holding", 8.0, "s", "a choice: a current
 _FAILED_P = LIMITS.add("probability of a thruster", 0.75, "", "a choice: an uneven load or a tether pulls as well")
 _LOST_P = LIMITS.add("probability that it costs the mission", 0.5, "", "5 of 11 such dives")
 _FRAME = "FRAME_CONFIG"
+_USUAL_FRAMES = frozenset((1.0, 2.0))
+"""Vectored, of six thrusters and of eight (AP_Motors6DOF.h): every other is one of few vehicles."""
 _NOT_DETECTED = re.compile(r"Failed! Please check Thruster (\d+) and frame setup!")
 """What motor detection says of a thruster that turns the vehicle neither way as its frame would (ArduSub:
 mode_motordetect.cpp)."""
@@ -85,7 +88,7 @@ def _fought(flight: Flight) -> Iterator[Finding]:
     if not found:
         return
     _, named, took, limit, spans = max(found)
-    yield Finding(
+    fought = Finding(
         kind="motor",
         title=f"a thruster is weak, off or reversed: it fights to hold its {named}",
         onset_s=spans[0][0],
@@ -93,19 +96,23 @@ def _fought(flight: Flight) -> Iterator[Finding]:
         severity="warning",
         evidence=(
             f"{100 * took:.0f}% of its control of the {named} for {seconds_in(spans):.0f} s, with no turn "
-            f"asked for (limit {100 * limit:.0f}%){_or_frame(flight)}"
+            f"asked for (limit {100 * limit:.0f}%)"
         ),
         source="RATE.ROut, YOut; ATT.DesRoll, DesYaw",
         probability=_FAILED_P,
         mission_lost=_LOST_P,
     )
+    yield _with_frame(flight, fought)
 
 
-def _or_frame(flight: Flight) -> str:
+def _with_frame(flight: Flight, found: Finding) -> Finding:
     """What looks the same: thrusters that are mixed for another frame than the one that is built."""
     default, frame = flight.default_left(_FRAME), flight.setting(_FRAME)
-    set_to = "" if default is None else f"{_FRAME} is {frame:g} (default {default:g})"
-    return f"; or another frame is set than is built: {set_to}" if set_to else ""
+    if default is None or frame is None:
+        return found
+    set_to = f"{_FRAME} is {frame:g} (default {default:g})"
+    told = replace(found, evidence=f"{found.evidence}; or another frame is set than is built: {set_to}")
+    return told if frame in _USUAL_FRAMES else replace(told, suspect="parameter", parameters=(_FRAME,))
 
 
 CHECK = Check("thruster", "a thruster of a submarine that is weak, off or reversed", READS, LIMITS, find)
