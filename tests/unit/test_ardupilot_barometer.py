@@ -50,3 +50,17 @@ def test_a_barometer_that_drifts_from_the_range_finder_on_the_ground_is_noted(dr
     found = made.find()
     assert [one.kind for one in found] == kinds
     assert all(one.severity == "info" for one in found)
+
+
+@pytest.mark.parametrize(("drift_m", "kinds"), [(0.0, []), (8.0, ["barometer"])])
+def test_the_barometer_of_a_submarines_board_feels_its_hull_and_no_depth(drift_m: float, kinds: list[str]) -> None:
+    dive = Made()
+    dive.facts = {"firmware": "ArduSub V4.5.0"}
+    depth, drift = np.interp(dive.t, [20, 40, 80, 95], [0, 12, 12, 0]), np.interp(dive.t, [30, 60], [0, drift_m])
+    warms = np.interp(dive.t, [0, 100], [0, 9])
+    air, water = 101_325.0, 9_800.0
+    dive.table["BARO"] |= {"Alt": warms, "Press": air - 12.0 * warms}
+    dive.table["BARO#2"] |= {"Alt": -depth + dive.noise(0.02), "Press": air + water * depth}
+    assert [one for one in every_finding(dive.find()) if one.kind == "barometer"] == []
+    dive.table["BARO"] |= {"Alt": -depth + drift, "Press": air + water * (depth - drift)}  # two in the water
+    assert [one.kind for one in every_finding(dive.find()) if one.kind == "barometer"] == kinds

@@ -33,7 +33,7 @@ from care_core.numbers import Bools, Floats, median, quantile
 
 READS: Wanted = {
     "POS": ("Lat", "Lng"),
-    "BARO": ("Alt", "Health"),
+    "BARO": ("Alt", "Press", "Health"),
     "GPS": ("Status", "Alt", "NSats"),
     "RFND": ("Dist", "Stat"),
     "CTUN": ("Alt", "BAlt", "SAlt"),
@@ -55,6 +55,7 @@ _SEVERE = LIMITS.add("times the limit that cost the height", 2.0, "", "a choice:
 _LOW_M = LIMITS.add("range at which it is compared", 3.0, "m", "a choice: higher, terrain explains a difference")
 _BEGAN_M = LIMITS.add("distance from the start at which it is compared", 10.0, "m", "a choice: the same terrain")
 _NO_RANGE_M = LIMITS.add("least range", 0.02, "m", "a choice: range finders say 0 where they see nothing")
+_WATER_PA_M = LIMITS.add("pressure of a metre, in water", 1000.0, "Pa/m", "water has 9800, air 12")
 _GOOD_SATS = LIMITS.add("satellites of a height to compare with", 8, "", "a choice: two more than the estimator wants")
 _BEFORE_LEAP_S = LIMITS.add("time before a leap of the GPS height", 5.0, "s", "a choice: it drifts off before")
 _CALIBRATION = calibrated(
@@ -95,6 +96,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     yield from _contradicted(flight)
     baros = [table.where(flight.watch(table.t)) for table in flight.all("BARO", "Alt")]
     baros = [table for table in baros if len(table) >= 5 and np.ptp(table["Alt"]) > 0]
+    if flight.kind == "sub":
+        baros = [table for table in baros if _feels_water(table)]
     if not baros:
         return
     first = baros[0]
@@ -106,7 +109,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         apart -= median(apart[: max(len(t) // _AT_FIRST, 3)])
         off = np.abs(smooth(t, apart, 3.0))
         tests.append(_Test(off, np.full(len(t), APART_M), APART_M, "is {:.1f} m off the second barometer"))
-    drift = _drift(flight, first)
+    drift = None if flight.kind == "sub" else _drift(flight, first)  # no receiver hears a satellite under water
     if drift is not None:
         allowed = DRIFT_M + _OF_HEIGHT * np.abs(height - height[0])
         tests.append(_Test(np.abs(drift), allowed, DRIFT_M, "drifts {:.0f} m from the GPS height"))
@@ -131,6 +134,12 @@ def find(flight: Flight) -> Iterator[Finding]:
         probability=calibrated_probability(max(peaks), _ON_WINGS if flight.is_winged else _CALIBRATION),
         mission_lost=_LOST_P,
     )
+
+
+def _feels_water(table: Table) -> bool:
+    """Whether a submarine's pressure sensor is in the water: the one on its board feels the air of the hull, which
+    warms up, and tells no depth."""
+    return "Press" in table.columns and float(np.ptp(table["Press"])) > _WATER_PA_M * float(np.ptp(table["Alt"]))
 
 
 def _contradicted(flight: Flight) -> Iterator[Finding]:
