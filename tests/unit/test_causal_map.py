@@ -145,6 +145,12 @@ def test_a_parameter_answers_where_the_firmware_reads_it(name: str, role: str, r
     assert sign in meaning.signs
 
 
+def test_an_offset_of_heights_that_a_plane_stands_above_ends_its_take_off() -> None:
+    meaning = meaning_of("ALT_OFFSET", "plane")
+    assert meaning is not None
+    assert {"no_takeoff", "height"} <= meaning.signs
+
+
 def test_what_is_read_in_no_flight_clears_a_parameter() -> None:
     for name in ("NTF_LED_BRIGHT", "LOG_DISARMED", "COMPASS_CAL_FIT", "INS_TRIM_OPTION", "GPS_INJECT_TO"):
         meaning = meaning_of(name, "copter")

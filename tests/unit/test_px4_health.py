@@ -15,6 +15,7 @@ from care_core.ecosystems.px4.attitude import lean_of
 from care_core.ecosystems.px4.examining import examine, reads
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.px4.messages import MESSAGES
+from care_core.ecosystems.px4.preflight import read_by
 from care_core.ecosystems.px4.upset import falls_after
 from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
@@ -491,6 +492,11 @@ def test_a_battery_that_runs_down_in_the_air_is_told_and_one_with_fewer_cells_th
     assert flown(11.6, 9.9, 3) == [("the battery has fewer cells than are set", "warning")]
     assert flown(25.0, 24.0, 0) == [("the battery has more cells than are set", "warning")]
     assert flown(17.4, 16.8, 0) == []  # cells of high voltage are full at 4.35 V
+
+
+@pytest.mark.parametrize("says", ["Found 0 compass (required: 1)", "Compass Sensor 0 missing", "Compass 1 missing"])
+def test_a_compass_that_is_missing_was_to_be_simulated(says: str) -> None:
+    assert "SENS_EN_MAGSIM" in read_by(says)
 
 
 def kept_for_its_charge(cells: float, empty_v: float, full_v: float) -> list[tuple[str, str, tuple[str, ...]]]:

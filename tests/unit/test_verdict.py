@@ -185,6 +185,11 @@ def test_a_critical_finding_of_a_run_that_met_its_objectives_is_a_fault_that_say
     )
 
 
+def test_a_run_that_only_armed_has_no_objectives_to_meet() -> None:
+    armed = replace(MET, variable=replace(MET.variable, name="armed"))
+    assert verdict_on([armed], [DRIFTS]).headline == "FAULT: the barometer drifts at 166.1 s (2:46)"
+
+
 def test_an_ok_names_the_part_that_surely_failed() -> None:
     verdict = verdict_on([MET], [LASER])
     assert verdict.headline == "OK, but the laser falls silent: /scan ends at 35.9 s"
