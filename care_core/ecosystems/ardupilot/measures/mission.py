@@ -54,7 +54,11 @@ class ArduPilotFlight(MissionKind):
         armed, disarmed = (
             {one.time_s for one in flight.arm_changes if one.is_armed is state} for state in (True, False)
         )
-        whole = [span for span in flight.recorded_armed if span[0] in armed or _begins_before(flight, span)]
+        whole = [
+            span
+            for span in flight.recorded_armed
+            if span[0] in armed or _begins_standing(flight, span) or _is_logged_once_armed(flight, span)
+        ]
         spans = [(start, end, end in disarmed) for start, end in whole]
         if not flight.arm_changes and flight.refusals:
             spans = [(0.0, flight.end_s, True)]
@@ -132,11 +136,15 @@ class UnrecordedArming(ArduPilotFlight):
         )
 
 
-def _begins_before(flight: Flight, span: Span) -> bool:
-    """Whether a log that begins armed holds the whole of a flight: it stood then, and took off later; or of a dive,
-    which submarines log from when they have been armed on, so that no record of that is in it."""
-    if flight.kind == "sub" and flight.is_written_armed and span[0] <= flight.armed[0][0]:
-        return any(span[0] < mode.start_s < span[1] and mode.way == "mission" for mode in flight.modes)
+def _is_logged_once_armed(flight: Flight, span: Span) -> bool:
+    """Whether a log that begins armed holds the whole of a dive: submarines that log nothing while disarmed open it
+    after the arming, so no record of that is in it."""
+    begins = flight.kind == "sub" and flight.is_written_armed and span[0] <= flight.armed[0][0]
+    return begins and any(span[0] < mode.start_s < span[1] and mode.way == "mission" for mode in flight.modes)
+
+
+def _begins_standing(flight: Flight, span: Span) -> bool:
+    """Whether a log that begins armed holds the whole of a flight: it stood then, and took off later."""
     took_off_s = next((start for start, _ in flight.airborne), None)
     return took_off_s is not None and span[0] + _STANDS_S < took_off_s < span[1]
 

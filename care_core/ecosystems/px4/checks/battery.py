@@ -160,7 +160,7 @@ def _no_levels(flight: Px4Flight, table: Table) -> Iterator[Finding]:
             evidence=(
                 f"{volts:.2f} V a cell at rest, more than half full; "
                 + listed([f"{one} is {flight.parameter(one):g} V" for one in wrong])
-                + ", which no cell is charged between"
+                + ", where no cell is empty or full"
             ),
             source=f"{_TOPIC}.voltage_v, remaining; {', '.join(wrong)}",
             suspect="parameter",
